@@ -1,5 +1,5 @@
 """The network seam: calls with retries, limits, cache and cost; recordings; baselines.
 
-Importing this package imports neither litellm nor aiohttp: the first call through one of them does,
-as do the first batch and the first look for a provider.
+Importing this package imports neither litellm nor aiohttp, which are loaded by the first call, the
+first batch or the first lookup of a provider.
 """

@@ -1,9 +1,9 @@
-"""A model asked in a provider's batches: slower, cheaper where the provider says so, never twice.
+"""Requests in a provider's batches: slower, cheaper if the provider says so, never sent twice.
 
-A request waits in the draft of a batch, which is sent when nothing more comes, or in the newest
-batch that the ledger has it in. Between the call that makes a batch and its id on disk nobody knows
-whether there is one. It is looked for under our name; where the provider tells no names, among the
-batches of that time with as many requests, by the names of requests in their answers.
+A request waits in the draft of a batch, which is sent when no more come, or in the newest batch
+that the ledger has it in. If a command is killed between the call that creates a batch and writing
+its id, the next one looks for the batch under phyblock's name for it or, if the provider reports no
+names, among the batches of that time and size, by the names of requests in their answers.
 """
 
 from __future__ import annotations
@@ -34,21 +34,20 @@ T = TypeVar("T")
 
 _FIRST_PAUSE_S = 5.0
 _QUIET_S = 30.0
-"""Time after which a draft that gets no more requests is sent, though more were expected [s]."""
+"""Time after which a draft that gets no more requests is sent, even if more were expected [s]."""
 _CLOCKS_APART_S = 3600.0
 _TIME = "%Y-%m-%dT%H:%M:%SZ"
 
 
 class UnsureError(UnavailableError):
-    """It is not known whether the provider has a batch."""
+    """It is unknown if the provider has a batch."""
 
 
 @dataclass(frozen=True)
 class BatchFiles:
-    """Batches of a run as they are kept: the lines written so far, oldest first, and a callback
-    that appends one and returns when it is on disk. A batch is looked at every `poll_s` at least;
-    `recorded` are the samples that had a record when the run was opened, and `expected` is how many
-    are going to be asked.
+    """The batch files of a run: the lines written so far, oldest first, and a callback that appends
+    one and returns when it is on disk. A batch is polled at least every `poll_s`; `recorded` are
+    the samples with a record when the run was opened, `expected` is the number of samples to ask.
     """
 
     earlier: tuple[BatchLine, ...]
@@ -59,7 +58,7 @@ class BatchFiles:
     expected: int = 0
 
     def answers(self, token: str) -> Path:
-        """Return the file of a batch's answers, which is there once it has ended."""
+        """Return the file of a batch's answers, which exists once it has ended."""
         return self.run_folder / "batches" / f"{token}.answers.jsonl"
 
 
@@ -68,12 +67,12 @@ class Batch:
     """A batch, from its draft, with `lines` of `size_bytes` to send, to its answers by request.
 
     `most_usd` are its requests by their keys in the reply cache, with the most that each can cost
-    [US dollars], None where no price is known; `held` are their reservations in the budget, and
-    `unheld` those of an earlier command, which held nothing in this one's yet. `token` is our name
-    for it, `id` the provider's. `work` is done when its answers are here, or when it is lost.
+    [US dollars], None if no price is known; `held` are their reservations in the budget, `unheld`
+    requests of an earlier command that have none yet. `token` is phyblock's name for it, `id` the
+    provider's. `work` ends when its answers have arrived, or it is lost.
     """
 
-    # What the providers allow in names and boundaries.
+    # Allowed by all providers in names and boundaries.
     token: str = field(default_factory=lambda: f"pb{secrets.token_hex(12)}")
     most_usd: dict[str, float | None] = field(default_factory=dict)
     created: datetime = field(default_factory=lambda: datetime.now(UTC))
@@ -94,7 +93,7 @@ class Batch:
         return self.id or self.token
 
     def take(self, line: BatchLine) -> None:
-        """Take in a line about it."""
+        """Update it by a line of the ledger."""
         if line.event == "intended":
             costs = line.most_usd or [None] * len(line.keys)
             self.most_usd = dict(zip(line.keys, costs, strict=True))
@@ -103,7 +102,7 @@ class Batch:
 
 
 def read_batches(lines: Iterable[BatchLine], model: str) -> list[Batch]:
-    """Return the batches of a model that are not lost, as its lines say, in their order."""
+    """Return the batches of a model that are not lost, from its lines, in their order."""
     batches: dict[str, Batch] = {}
     for line in lines:
         if line.model == model:
@@ -112,16 +111,16 @@ def read_batches(lines: Iterable[BatchLine], model: str) -> list[Batch]:
 
 
 def under_way(lines: Iterable[BatchLine], model: str) -> list[Batch]:
-    """Return the batches of a model that have not ended, as its lines say."""
+    """Return the batches of a model that have not ended, from its lines."""
     return [batch for batch in read_batches(lines, model) if batch.event != "ended"]
 
 
 @dataclass(eq=False, kw_only=True)
 class BatchModel:
-    """A Model over a provider's batches: a batch is sent when nothing has been asked for a while.
+    """A Model over a provider's batches, which are sent when no request has come for a while.
 
-    `client` makes a client that sends through an HTTP client: by it requests are written and
-    answers are read as those of direct calls.
+    `client` makes a client over an HTTP client, which writes requests and reads answers as in
+    direct calls.
     """
 
     config: ModelConfig
@@ -140,7 +139,7 @@ class BatchModel:
         for batch in self._batches:
             batch.unheld = set(batch.most_usd)
         self._ended_before = [batch for batch in self._batches if batch.event == "ended"]
-        # By request: the batch, or the draft of one, in which it has not failed.
+        # By request: the batch or draft that holds it and in which it has not failed.
         self._newest = {key: batch for batch in self._batches for key in batch.most_usd}
         self._asked = 0
         self._adding = asyncio.Lock()
@@ -153,7 +152,7 @@ class BatchModel:
     async def ask(self, request: Request) -> Reply:
         """Return the cached reply, or the answer of the newest batch with the request.
 
-        Raises what the model seam says. Cancelled, it gives up, and the batch goes on.
+        Raises as `Model.ask`. When cancelled, it gives up, and the batch continues.
         """
         key, failures = reply_key(self.config, request), 0
         self._asked += 1
@@ -162,7 +161,7 @@ class BatchModel:
                 if self.cache is not None and (kept := self.cache.get(key)) is not None:
                     return kept.model_copy(update={"cost_usd": cost_usd(self.budget.tariff, kept)})
                 async with self._adding:
-                    # Another sample may have asked the same meanwhile.
+                    # Another sample may have sent the same request meanwhile.
                     batch = self._newest.get(key) or await self._add(key, request)
             if key in batch.unheld:
                 batch.unheld.discard(key)
@@ -176,7 +175,7 @@ class BatchModel:
                     continue
                 reply = await self._read(key, request, batch)
             except UnavailableError:
-                # No more is heard in this command of what is under way: it counts as spent.
+                # This command gets no more news of batches in progress: they count as spent.
                 for each in self._batches:
                     self._settle_all(each, None)
                 raise
@@ -184,7 +183,7 @@ class BatchModel:
                 if self._newest.get(key) is batch:
                     del self._newest[key]
                 if batch in self._ended_before and request.sample in self.files.recorded:
-                    # It was recorded, and counted.
+                    # It was recorded and counted.
                     self._settle(key, batch, 0.0)
                     continue
                 self._settle(key, batch, None if may_be_billed(error) else 0.0)
@@ -194,7 +193,7 @@ class BatchModel:
                     continue
                 raise
             if key in self._given:
-                # A second sample that asks the same.
+                # A second sample with the same request.
                 return reply.model_copy(update={"cached": True, "attempts": 0})
             self._given.add(key)
             self._settle(key, batch, reply.cost_usd)
@@ -206,7 +205,7 @@ class BatchModel:
             return reply
 
     async def aclose(self) -> None:
-        """Release connections; batches go on at the provider."""
+        """Release connections; batches continue at the provider."""
         works = [batch.work for batch in self._batches if batch.work is not None]
         for work in works:
             work.cancel()
@@ -214,7 +213,7 @@ class BatchModel:
         await self._provider.aclose()
 
     async def _add(self, key: str, request: Request) -> Batch:
-        """Put a request into the draft, or a new one, once the budget has room for it."""
+        """Add a request to the current draft, or a new one, once the budget has room for it."""
         self._is_writing, http = True, _NoConnection()
         try:
             await self.client(http).complete(request)
@@ -249,7 +248,7 @@ class BatchModel:
         return draft
 
     def _settle(self, key: str, batch: Batch, usd: float | None) -> None:
-        """Count the cost of a request, once; None is all that it can have cost."""
+        """Count the cost of a request once; None is the most that it can have cost."""
         if key in batch.held:
             spent_usd = self.budget.settle(batch.held.pop(key), usd)
             self._billed_usd[key] = self._billed_usd.get(key, 0.0) + spent_usd
@@ -259,7 +258,7 @@ class BatchModel:
             self.budget.settle(batch.held.popitem()[1], usd)
 
     async def _note(self, batch: Batch, event: BatchEvent, **fields: object) -> None:
-        """Write the newest state of a batch; requests of a lost one count as not sent in it."""
+        """Write the newest state of a batch; requests of a lost batch count as not sent."""
         known = {"batch": batch.token, "model": self.name, "event": event}
         now = datetime.now(UTC).strftime(_TIME)
         line = BatchLine.model_validate({**known, "time": now, **fields})
@@ -271,8 +270,8 @@ class BatchModel:
     # A batch from its draft to its answers.
 
     async def _take_through(self, batch: Batch) -> None:
-        """Send a draft that grows no more, or find what an earlier command was sending; then wait
-        for the answers. A batch that is lost or refused ends without.
+        """Send a complete draft, or find a batch that an earlier command was sending; then wait for
+        the answers. A lost or refused batch ends without answers.
         """
         short_s = min(1.0, 4 * self.files.poll_s)
         if batch.event is None:
@@ -288,7 +287,7 @@ class BatchModel:
                 await sending
                 raise
         elif batch.event == "intended":
-            # A call that was cut off may still be worked on over there.
+            # The provider may still be processing a call that was cut off.
             status = await self._find(batch, time.time() + 2 * self.files.poll_s)
             if status is None:
                 await self._note(batch, "lost", words="not found at the provider")
@@ -312,7 +311,7 @@ class BatchModel:
             batch.answers = await asyncio.to_thread(answers_of, lines, self._provider, batch)
 
     async def _send(self, batch: Batch) -> None:
-        """Send a draft; where that fails, nothing more is sent."""
+        """Send a draft; if that fails, nothing more is sent."""
         costs = [] if None in batch.most_usd.values() else list(batch.most_usd.values())
         await self._note(batch, "intended", keys=tuple(batch.most_usd), most_usd=costs)
 
@@ -329,7 +328,7 @@ class BatchModel:
         try:
             status = await self._patiently(create)
         except UnsureError as error:
-            # The next command finds it, if it is there.
+            # The next command finds the batch, if it exists.
             self._refusal = error
             raise
         except UnavailableError as error:
@@ -343,7 +342,7 @@ class BatchModel:
         self._report(f"sent batch {batch.shown} of {len(batch.most_usd):,}")
 
     async def _find(self, batch: Batch, until_s: float) -> BatchStatus | None:
-        """Return the batch that was being sent, None where there is none; raises UnsureError."""
+        """Return the batch that was being sent, or None if there is none; raises UnsureError."""
         strangers = {one.id for one in self._batches}
         since_s = batch.created.timestamp() - _CLOCKS_APART_S
         try:
@@ -374,7 +373,7 @@ class BatchModel:
             raise UnsureError(why, status=error.status, sent=error.sent) from None
 
     async def _patiently(self, call: Callable[[], Awaitable[T]]) -> T:
-        """Call until it succeeds or cannot; UnavailableError where it never does."""
+        """Call until it succeeds or cannot. Raises UnavailableError if it never does."""
         try:
             async for attempt in self.policy.retrying(lambda *_: None):
                 with attempt:
@@ -386,7 +385,7 @@ class BatchModel:
         raise AssertionError("tenacity neither returned nor raised")
 
     async def _answered(self, batch: Batch, path: Path) -> bytes | None:
-        """Wait for a batch and keep its answers; None where it was refused as a whole."""
+        """Wait for a batch and keep its answers; None if it was refused as a whole."""
         try:
             status = await self._last_status(batch)
             if status.state == "refused":
@@ -396,7 +395,7 @@ class BatchModel:
                 return None
             lines = await self._patiently(partial(self._provider.results, status))
         except ModelError as error:
-            # An error of its requests is another thing: these are asked again, or recorded.
+            # Errors of its requests are different: these are asked again, or recorded.
             why = f"no answers of batch {batch.shown}, which stays at the provider: {error}"
             raise UnavailableError(why, status=error.status, sent=error.sent) from None
         with writing(path):
@@ -409,7 +408,7 @@ class BatchModel:
         return lines
 
     async def _last_status(self, batch: Batch) -> BatchStatus:
-        """Look at a batch now and then; return its last state."""
+        """Poll a batch until it has ended; return its last state."""
         pause_s, failures, logged = min(_FIRST_PAUSE_S, self.files.poll_s), 0, ""
         while True:
             try:
@@ -431,7 +430,7 @@ class BatchModel:
             pause_s = min(self.files.poll_s, 1.5 * pause_s)
 
     async def _read(self, key: str, request: Request, batch: Batch) -> Reply:
-        """Return the reply that a direct call would have made of the answer; raises as that."""
+        """Return the reply that a direct call would return for the answer; raises like it."""
         assert batch.answers is not None, "the batch has ended"
         answer = batch.answers.get(key)
         if answer is None:
@@ -450,7 +449,7 @@ class BatchModel:
 
 
 class _NoConnection(HttpClient):
-    """Keeps what would be sent, and gives an answer that is here already."""
+    """Keeps the data of a request instead of sending it, and returns an answer that has arrived."""
 
     def __init__(self, answer: Answer | None = None) -> None:
         self.body = b""
@@ -458,7 +457,7 @@ class _NoConnection(HttpClient):
         self._answer = answer
 
     async def send(self, url: str, body: bytes, headers: Mapping[str, str], **_: Any) -> Answer:
-        """Return the answer; RetryableError where there is none: nothing was sent."""
+        """Return the answer. Raises RetryableError if there is none: nothing was sent."""
         self.body, self.headers = body, headers
         if self._answer is None:
             raise RetryableError(f"a request to {url} is kept for a batch", sent="no")
@@ -471,8 +470,8 @@ def custom_id(batch: Batch, place: int) -> str:
 
 
 def answers_of(lines: bytes, provider: BatchProvider, batch: Batch) -> dict[str, Answer | str]:
-    """Return the first readable answer to each request of a batch that has one; a text says why
-    the request was never asked.
+    """Return the first readable answer to each request of a batch that has one, or a text on why
+    the request was never processed.
     """
     keys = {custom_id(batch, place): key for place, key in enumerate(batch.most_usd)}
     found: dict[str, Answer | str] = {}

@@ -1,4 +1,4 @@
-"""Batches of OpenAI, Anthropic and Gemini: how each is written, sent, watched and read.
+"""Batches of OpenAI, Anthropic and Gemini: writing, sending, polling and reading them.
 
 Sources, read in November 2026. OpenAI, guide "Batch API" (format of lines, 50,000 requests and 200
 MB a file, states, `batch_expired`) and API reference of files and batches. Anthropic, guide "Batch
@@ -29,7 +29,7 @@ Post = tuple[str, bytes, Mapping[str, str]]
 """Address, body and headers of a call."""
 
 UNREADABLE = (AttributeError, KeyError, TypeError, ValueError)
-"""Errors of reading what does not have the form that its provider documents."""
+"""Errors of reading data that differ from the provider's documentation."""
 
 _LOOK_S = 60.0
 _TRANSFER_S = 3600.0
@@ -38,12 +38,12 @@ _LARGEST_RESULTS_BYTES = 1024**3
 
 @dataclass(frozen=True)
 class BatchStatus:
-    """The state of a batch, as its provider says.
+    """The state of a batch, as its provider reports it.
 
     No request of a `refused` batch was answered; a `cancelled` one may lack some answers. `words`
-    are the provider's, with counts and errors; `results` are the addresses of the answers. `token`
-    is the name that we gave it, None where the provider does not tell. `total` counts requests, 0
-    where it does not say; `created_s` is a Unix time.
+    are the provider's message, with counts and errors; `results` are the addresses of the answers.
+    `token` is phyblock's name for it, None if the provider does not report it. `total` is the
+    number of requests, 0 if not reported; `created_s` is a Unix time.
     """
 
     id: str
@@ -58,9 +58,10 @@ class BatchStatus:
 class BatchProvider(ABC):
     """One provider's batches: `create`, `status`, `results`, and `listed` to find one again.
 
-    Methods raise ModelErrors, in which no key stands. Everything is sent with `headers`, in which
-    the model's key is put, to the model's server alone. A batch is at `url` and its id, their list
-    at `first_page`. Its bounds are below those of each provider, as a batch is kept in memory.
+    Methods raise ModelErrors, which contain no key. Everything is sent with `headers`, in which the
+    model's key is inserted, and only to the model's server. A batch is at `url` and its id, the
+    list at `first_page`. The limits are below those of each provider, since a batch is kept in
+    memory.
     """
 
     most_requests = 50_000
@@ -80,10 +81,10 @@ class BatchProvider(ABC):
 
     @abstractmethod
     def line(self, custom_id: str, body: bytes, headers: Mapping[str, str]) -> bytes:
-        """Return the line of a request with the body, and of the headers, of a direct call."""
+        """Return the line of a request from the body and headers of a direct call."""
 
     async def create(self, token: str, lines: Sequence[bytes]) -> BatchStatus:
-        """Begin a batch. After an error that was not `sent="no"` it may have begun all the same."""
+        """Create a batch. After an error other than `sent="no"`, it may exist all the same."""
         try:
             post = await self._prepare(token, lines)
         except ModelError as error:
@@ -92,11 +93,11 @@ class BatchProvider(ABC):
         return await self._call(self._status_in, *post)
 
     async def status(self, batch_id: str) -> BatchStatus:
-        """Ask how a batch is now."""
+        """Return the current state of a batch."""
         return await self._call(self._status_in, f"{self._url}/{batch_id}")
 
     async def listed(self, since_s: float) -> list[BatchStatus]:
-        """Return the batches of the account since a time, the newest first."""
+        """Return the batches of the account since a time, newest first."""
         found: list[BatchStatus] = []
         url = self._first_page
         while url and (not found or found[-1].created_s >= since_s):
@@ -115,8 +116,8 @@ class BatchProvider(ABC):
 
     @abstractmethod
     def read(self, line: Any) -> tuple[str, Answer | str]:
-        """Return the name of a request, and its answer as a server would have given it, or the
-        reason why it was never asked. Raises one of UNREADABLE for what is no line of results.
+        """Return the name of a request, and its answer as a server would have sent it, or the
+        reason why it was never processed. Raises one of UNREADABLE for a malformed line.
         """
 
     async def aclose(self) -> None:
@@ -126,11 +127,11 @@ class BatchProvider(ABC):
 
     @abstractmethod
     async def _prepare(self, token: str, lines: Sequence[bytes]) -> Post:
-        """Return the call that begins a batch; nothing is begun."""
+        """Return the call that creates a batch, without making it."""
 
     @abstractmethod
     def _read_status(self, batch: Any) -> BatchStatus:
-        """Read what the provider says of a batch; raises one of UNREADABLE."""
+        """Read the provider's description of a batch; raises one of UNREADABLE."""
 
     def _read_page(self, page: Any) -> tuple[list[BatchStatus], str]:
         """Return the batches on a page of the list, and the address of the next one or ""."""
@@ -150,7 +151,7 @@ class BatchProvider(ABC):
         created: str | float | None = None,
     ) -> BatchStatus:
         """Return a status; `words` are a state, the number of answered requests, and errors. A
-        batch whose age is not known counts as new.
+        batch of unknown age counts as new.
         """
         if not (isinstance(name, str) and name):
             raise ValueError("a batch without a name")
@@ -172,7 +173,7 @@ class BatchProvider(ABC):
         *,
         is_large: bool = False,
     ) -> T:
-        """Send once and read the answer; a body and an answer that `is_large` take their time."""
+        """Send once and read the answer; `is_large` allows more time for the transfer."""
         try:
             if urlsplit(url)[:2] != urlsplit(self._base)[:2]:
                 why = f"nothing is sent to {host_of(url)}, which is not the model's server"
@@ -239,7 +240,7 @@ class _OpenAI(BatchProvider):
     def _read_status(self, batch: Any) -> BatchStatus:
         word, counts = batch["status"], batch.get("request_counts") or {}
         files = [batch[name] for name in ("output_file_id", "error_file_id") if batch.get(name)]
-        # Taken for empty, a batch whose files are not there yet would be asked again.
+        # A batch without its files yet must not count as empty, or it would be asked again.
         ends = {"expired": "ended", "cancelled": "cancelled", "failed": "refused"}
         return self._status(
             batch["id"],
@@ -253,21 +254,21 @@ class _OpenAI(BatchProvider):
 
 
 class _Anthropic(BatchProvider):
-    """`/v1/messages/batches`, in which a batch has no name of ours."""
+    """`/v1/messages/batches`, where batches cannot have names."""
 
     headers: ClassVar[Mapping[str, str]] = {"anthropic-version": "2023-06-01", "x-api-key": "{key}"}
     after = "after_id"
 
     def __init__(self, config: ModelConfig) -> None:
         base = (config.api_base or "https://api.anthropic.com").rstrip("/")
-        # As litellm takes an address, with or without the path of the messages.
+        # As in litellm, the address may include the path of messages or not.
         base = base.removesuffix("/messages").removesuffix("/v1")
         url = f"{base}/v1/messages/batches"
         super().__init__(config, base, url, f"{url}?limit=100")
         self._betas: set[str] = set()
 
     def line(self, custom_id: str, body: bytes, headers: Mapping[str, str]) -> bytes:
-        # The batch asks for the betas that any of its requests needs.
+        # The batch requests the betas that any of its requests needs.
         betas = next((v for name, v in headers.items() if name.lower() == "anthropic-beta"), "")
         self._betas |= {name.strip() for name in betas.split(",") if name.strip()}
         return _joined({"custom_id": custom_id}, "params", body)
@@ -282,7 +283,7 @@ class _Anthropic(BatchProvider):
             return line["custom_id"], result["type"]
         if result["type"] == "succeeded":
             return line["custom_id"], _answer(200, result["message"])
-        # The error stands in an error response, or alone.
+        # The error is in an error response, or by itself.
         error = result["error"].get("error") or result["error"]
         status = _ANTHROPIC_STATUSES.get(error.get("type"), 500)
         return line["custom_id"], _answer(status, {"type": "error", "error": error})
@@ -295,7 +296,7 @@ class _Anthropic(BatchProvider):
             batch["id"],
             state if has_ended else "running",
             (word, counts.get("succeeded"), ()),
-            # Not `results_url`, which behind a gateway is the provider's own and out of reach.
+            # Not `results_url`, which behind a gateway is the provider's own and unreachable.
             [f"{self._url}/{batch['id']}/results"] if has_ended else [],
             total=sum(int(number or 0) for number in counts.values()),
             created=batch.get("created_at"),
@@ -310,7 +311,7 @@ class _Gemini(BatchProvider):
     def __init__(self, config: ModelConfig) -> None:
         base = config.api_base or "https://generativelanguage.googleapis.com"
         base = base.rstrip("/").removesuffix("/v1beta")
-        # The name of a batch holds the rest of the path.
+        # The name of a batch includes the rest of the path.
         super().__init__(config, base, f"{base}/v1beta", f"{base}/v1beta/batches?pageSize=100")
 
     def line(self, custom_id: str, body: bytes, headers: Mapping[str, str]) -> bytes:  # noqa: ARG002
@@ -374,7 +375,7 @@ PROVIDERS: Mapping[str, Callable[[ModelConfig], BatchProvider]] = {
     "anthropic": _Anthropic,
     "gemini": _Gemini,
 }
-"""By the prefix of a model's id; models of others are refused with their file."""
+"""By the prefix of a model's id; the models file refuses batches of other providers."""
 
 _ANTHROPIC_STATUSES: Mapping[str, int] = {
     "invalid_request_error": 400, "authentication_error": 401, "billing_error": 402,
@@ -387,7 +388,7 @@ _GOOGLE_STATUSES: Mapping[int, int] = {
 
 
 def _joined(fields: Mapping[str, Any], name: str, body: bytes) -> bytes:
-    """Return an object as JSON with the JSON `body` under a further name, as it is."""
+    """Return an object as JSON, with the JSON `body` inserted unchanged under a further name."""
     return json.dumps({**fields, name: None}).encode().removesuffix(b"null}") + body + b"}"
 
 
@@ -396,9 +397,9 @@ def _answer(status: int, body: Mapping[str, Any]) -> Answer:
 
 
 def _object(answer: Answer) -> Any:
-    """Return the object that was answered; raises its error where it is one."""
+    """Return the object in an answer; raises the answer's error."""
     found: Any = load_json(answer.body)
-    # A batch that failed holds its error beside its name.
+    # A failed batch has its error beside its name.
     if found.get("error") and not found.keys() & {"id", "name"}:
         raise error_of(answer)
     return found

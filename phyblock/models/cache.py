@@ -1,8 +1,8 @@
 """The reply cache: content-addressed, in one SQLite file that processes may share.
 
-A reply is found again when everything that decided it is the same: model, parameters, messages with
-their pictures, seed and prompt version. Where the model is served decides nothing. Only whole
-answers are kept: no error, no empty, truncated or refused reply, no picture, no key.
+A reply is found again when everything that determines it is the same: model, parameters, messages
+with their pictures, seed and prompt version, but not the address of the server. Only complete
+replies are kept: no error, no empty, truncated or refused reply, no picture, no key.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from phyblock.records.record import Reply
 from phyblock.text import hex_digest
 
 SCHEMA = 1
-"""Version of the file's layout and of what enters a key."""
+"""Version of the file's layout and of the contents of a key."""
 
 _BUSY_TIMEOUT_S = 2.0
 _HINT = (
@@ -37,7 +37,7 @@ CREATE TABLE IF NOT EXISTS replies (
 
 
 def reply_key(config: ModelConfig, request: Request) -> str:
-    """Hex digest of everything that decides the reply."""
+    """Return the hex digest of everything that determines the reply."""
     content = {
         "schema": SCHEMA,
         "model": {**config.identity(), "params": wire_params(config, request)},
@@ -58,11 +58,11 @@ def reply_key(config: ModelConfig, request: Request) -> str:
 class ReplyCache:
     """Replies by key, in one SQLite file that several processes may have open.
 
-    Two processes that ask the same at the same time may both pay for it: the later reply stays.
-    Within a process `shared` prevents that. Raises StoreError for a file that is broken, foreign or
-    cannot be used. With `report`, which is for runs, what fails after the opening is reported, and
-    the run goes on without the cache: replies are in its records too. A row that cannot be read is
-    missing.
+    Two processes that send the same request at the same time may both pay for it; the later reply
+    is kept. Within a process `shared` prevents that. Raises StoreError for a file that is broken,
+    foreign or cannot be used. With `report`, which runs set, failures after opening are reported,
+    and the run continues without the cache: replies are in its records too. An unreadable row
+    counts as missing.
     """
 
     def __init__(self, path: Path, report: Callable[[str], None] | None = None) -> None:
@@ -92,7 +92,7 @@ class ReplyCache:
 
     def get(self, key: str) -> Reply | None:
         """Return the reply kept under `key`, marked as cached, or None."""
-        # As bytes: SQLite calls the whole file unusable where a text is no UTF-8.
+        # As bytes: SQLite calls the whole file unusable if a text is not UTF-8.
         sql = "SELECT CAST(reply AS BLOB) FROM replies WHERE key = ?"
         row = None
         with self._using():
@@ -111,7 +111,7 @@ class ReplyCache:
         """Keep a reply, unless it is empty, truncated or refused; True if it was kept."""
         if self._is_off or reply.finish in ("length", "refusal") or not reply.text.strip():
             return False
-        # What this run paid is no part of what another finds.
+        # The cost in this run does not apply to others.
         fields = reply.model_dump(exclude={"billed_usd"})
         row = (key, model_id, time.time(), json.dumps(fields, separators=(",", ":")))
         with self._using():
@@ -121,7 +121,7 @@ class ReplyCache:
 
     @contextlib.asynccontextmanager
     async def shared(self, key: str) -> AsyncIterator[None]:
-        """Wait until nobody else of this process asks the same."""
+        """Wait until no other task of this process sends the same request."""
         while (other := self._asked.get(key)) is not None:
             await asyncio.wait((other,))
         self._asked[key] = asyncio.get_running_loop().create_future()
@@ -139,12 +139,12 @@ class ReplyCache:
 
     @property
     def size_bytes(self) -> int:
-        """The size of its file, with what was written last and lies beside it."""
+        """The size of its file, including the write-ahead log beside it."""
         files = (self.path.with_name(self.path.name + end) for end in ("", "-wal"))
         return sum(file.stat().st_size for file in files if file.exists())
 
     def clear(self, model_id: str | None = None) -> int:
-        """Drop all replies, or those of one model id; returns how many."""
+        """Delete all replies, or those of one model id; return their number."""
         with self._using():
             sql = "DELETE FROM replies WHERE ?1 IS NULL OR model = ?1"
             dropped = self._db.execute(sql, (model_id,)).rowcount
@@ -156,7 +156,7 @@ class ReplyCache:
         self._db.close()
 
     def _prepare(self) -> None:
-        """Open the file, or make it, so that a committed reply survives the process (WAL)."""
+        """Open or create the file so that a committed reply survives the process (WAL)."""
         self._db.execute("BEGIN")
         version = self._db.execute("PRAGMA user_version").fetchone()[0]
         tables = self._db.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]

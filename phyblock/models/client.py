@@ -1,8 +1,8 @@
 """Parts of both clients: one HTTP client with bounds, the reply in an answer, or its error.
 
-No redirect is followed, so that keys and prompts go to the host that was named and to no other. A
-body is read up to a limit. The time limit holds for the whole exchange, whatever the server does.
-Nothing is sent twice. aiohttp is imported by the first call.
+Redirects are not followed, so that keys and prompts go only to the host that was named. A body is
+read up to a limit. The time limit applies to the whole exchange, whatever the server does. Nothing
+is sent twice. aiohttp is imported by the first call.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ OPENAI_API_BASE = "https://api.openai.com/v1"
 _LONGEST_CONNECT_S = 30.0
 _LONGEST_MESSAGE = 500
 _LONGEST_WORDS = 20_000
-"""Characters of a server's words that are looked at; far fewer are shown."""
+"""Characters of a server's message that are examined; far fewer are shown."""
 
 _RETRYABLE = (408, 409, 425, 429)
 _UNAVAILABLE = (401, 402, 403, 404)
@@ -63,7 +63,7 @@ _NEVER = re.compile(
     re.IGNORECASE,
 )
 _MOST_TOKENS = 10**9
-"""A hundred times the longest context that there is."""
+"""A hundred times the longest existing context."""
 
 _FINISH: Mapping[str, Finish] = {
     **dict.fromkeys(("stop", "end_turn", "stop_sequence", "eos", "eos_token"), "stop"),
@@ -72,25 +72,25 @@ _FINISH: Mapping[str, Finish] = {
     **dict.fromkeys(("recitation", "blocklist", "prohibited_content"), "refusal"),
     **dict.fromkeys(("spii", "image_safety"), "refusal"),
 }
-"""Words for the end of a reply, in lower case, by provider's dialect."""
+"""Providers' words for the end of a reply, in lower case."""
 _THINKING = re.compile(r"\s*<(think|thinking)>(.*?)</\1>\s*(.*)", re.DOTALL)
 
 
 class Client(ABC):
     """Sends a request to one server, once: retries, limits and the cache are above.
 
-    Neither its replies nor its errors hold a key. An error that is no ModelError is a bug of ours,
-    or an input that cannot be sent, and ends the run.
+    Neither its replies nor its errors contain a key. An error other than ModelError is a bug in
+    phyblock, or an input that cannot be sent, and ends the run.
     """
 
     def __init__(self, config: ModelConfig, http: HttpClient | None = None) -> None:
-        """`http` sends in the place of a connection of its own."""
+        """`http` sends instead of a new connection."""
         self.config = config
         self.http = http or HttpClient(config.timeout_s)
         self._secrets = secrets_of(config)
 
     async def complete(self, request: Request) -> Reply:
-        """Return the validated reply, its cost not yet known; raises ModelError."""
+        """Return the validated reply, without its cost; raises ModelError."""
         seed = request.seed if self.takes_seed else None
         try:
             reply = await self._complete(request, seed)
@@ -114,7 +114,7 @@ class Client(ABC):
 
     @abstractmethod
     async def _complete(self, request: Request, seed: int | None) -> Reply:
-        """Send once; keys may stand in what comes of it."""
+        """Send once; the result may contain keys."""
 
     async def aclose(self) -> None:
         """Close all connections."""
@@ -122,17 +122,17 @@ class Client(ABC):
 
 
 def shown(text: str, secrets: tuple[str, ...]) -> str:
-    """Return a text for messages and records: keys are taken out before it is cut."""
+    """Return a text for messages and records: keys are removed before it is cut."""
     return " ".join(hidden(text, secrets).split())[:_LONGEST_MESSAGE]
 
 
 LARGEST_REPLY_BYTES = 32 * 1024 * 1024
-"""Default limit of a reply's body [bytes]: a hundred times what the longest thoughts take."""
+"""Default limit of a reply's body [bytes]: a hundred times the longest reasoning."""
 
 
 @dataclass(frozen=True)
 class Answer:
-    """The answer of a server; `fault` says what is wrong with its body, or "" for nothing."""
+    """A server's answer; `fault` is the problem of its body, or ""."""
 
     status: int
     headers: Mapping[str, str]
@@ -141,12 +141,12 @@ class Answer:
 
     @property
     def is_success(self) -> bool:
-        """True if the status promises a reply."""
+        """True if the status indicates a reply."""
         return 200 <= self.status < 300
 
 
 class HttpClient:
-    """Sends requests for one model, over one session that is opened by the first."""
+    """Sends requests for one model over one session, which the first request opens."""
 
     def __init__(self, timeout_s: float, most_bytes: int | None = None) -> None:
         self._timeout_s = timeout_s
@@ -159,8 +159,8 @@ class HttpClient:
     ) -> Answer:
         """Send once and read the answer.
 
-        Raises UnreachableError where no connection could be made in time, and RetryableError where
-        it was lost or the answer did not end in time.
+        Raises UnreachableError if no connection could be made in time, and RetryableError if it was
+        lost or the answer did not end in time.
         """
         import aiohttp
         import yarl
@@ -203,7 +203,7 @@ class HttpClient:
             raise RetryableError(lost, sent="lost") from None
 
     async def _read(self, response: aiohttp.ClientResponse, url: str) -> tuple[bytes, str]:
-        """Return the body, or b"" and what is wrong with it."""
+        """Return the body, or b"" and its problem."""
         import aiohttp
 
         if 300 <= response.status < 400:
@@ -233,7 +233,7 @@ class HttpClient:
             self._session = None
 
     def _proxy(self, url: str) -> str | None:
-        """Return the proxy that the environment names for an address, looked up once."""
+        """Return the proxy that the environment sets for an address, looked up once."""
         parts = urllib.parse.urlsplit(url)
         place = parts.scheme, parts.hostname or ""
         if place not in self._proxies:
@@ -249,7 +249,7 @@ class OpenAIClient(Client):
     """`POST {api_base}/chat/completions`."""
 
     def __init__(self, config: ModelConfig, http: HttpClient | None = None) -> None:
-        # Else the request, with another provider's key, would go to OpenAI.
+        # Otherwise the request, with another provider's key, would go to OpenAI.
         assert config.api_base is not None or config.provider == "openai"
         super().__init__(config, http)
         self._url = f"{(config.api_base or OPENAI_API_BASE).rstrip('/')}/chat/completions"
@@ -273,10 +273,10 @@ class OpenAIClient(Client):
 
 
 def read_json(answer: Answer) -> object:
-    """Return the decoded body of an answer whose status promises a reply.
+    """Return the decoded body of an answer whose status indicates a reply.
 
-    Raises a ModelError for a body that is not whole, is no JSON within bounds, or is an error: some
-    servers send those with status 200.
+    Raises a ModelError for a body that is incomplete, is not JSON within bounds, or is an error:
+    some servers send those with status 200.
     """
     if answer.fault or not answer.is_success:
         raise error_of(answer)
@@ -293,8 +293,8 @@ def read_json(answer: Answer) -> object:
 def read_completion(body: object, latency_s: float, status: int = 200) -> Reply:
     """Return the reply in the decoded body of a success.
 
-    Thoughts that a server leaves in the text between think tags become reasoning, as litellm does
-    it. Raises RetryableError when the body is no chat completion, or one without choices.
+    Thoughts that a server leaves in the text between think tags become reasoning, as in litellm.
+    Raises RetryableError if the body is not a chat completion, or one without choices.
     """
     raw = read_chat_completion(body)
     if raw is None:
@@ -305,15 +305,15 @@ def read_completion(body: object, latency_s: float, status: int = 200) -> Reply:
 
 
 def malformed(status: int, why: str) -> RetryableError:
-    """Return the error of a success that holds no reply: it was answered, and may be billed."""
+    """Return the error of a success without a reply: it was answered, and may be billed."""
     return RetryableError(f"HTTP {status}: malformed reply: {why}", status=status)
 
 
 def error_of(answer: Answer) -> ModelError:
-    """Return the error of an answer that holds no reply.
+    """Return the error of an answer without a reply.
 
-    An error that came as a success says by its own code which it is: a limit that is reached and a
-    fault behind a gateway are no replies that were paid for.
+    An error that came with a success status is classified by its own code: a reached limit or a
+    fault behind a gateway is not a reply that was paid for.
     """
     status = code = answer.status
     if answer.fault and answer.is_success:
@@ -335,7 +335,7 @@ def error_of(answer: Answer) -> ModelError:
 
 
 def _words(body: bytes) -> tuple[str, tuple[str, ...]]:
-    """Return what an error body says, and its codes: servers write them as numbers and as names."""
+    """Return the message and codes of an error body; codes are numbers or names."""
     text = body[: 4 * _LONGEST_WORDS].decode("utf-8", "replace")[:_LONGEST_WORDS]
     try:
         raw: Any = load_json(body)
@@ -351,7 +351,7 @@ def _words(body: bytes) -> tuple[str, tuple[str, ...]]:
 
 
 def retry_after_s(headers: Mapping[str, str]) -> float | None:
-    """Return the seconds that a `Retry-After` header asks for, given as seconds or HTTP date."""
+    """Return the seconds of a `Retry-After` header, given as seconds or HTTP date."""
     value = next((v for k, v in headers.items() if k.lower() == "retry-after"), None)
     if value is None:
         return None
@@ -370,9 +370,9 @@ def retry_after_s(headers: Mapping[str, str]) -> float | None:
 def read_raw_reply(raw: object, where: str) -> Reply:
     """Return the reply in a decoded JSON document; `where` names it in errors.
 
-    Known are the shapes of the official outputs: chat completions, Anthropic messages, Gemini
-    responses (as the REST API and as its Python client write them), and a text under `predict`,
-    `text` or `response`. Raises DataError for any other.
+    It may have any shape of the official outputs: chat completions, Anthropic messages, Gemini
+    responses (as written by the REST API or its Python client), and a text under `predict`, `text`
+    or `response`. Raises DataError for any other.
     """
     for read in (read_chat_completion, _anthropic, _gemini):
         if (reply := read(raw)) is not None:
@@ -412,7 +412,7 @@ def read_chat_completion(raw: object) -> Reply | None:
 
 
 def _anthropic(raw: object) -> Reply | None:
-    """Read Anthropic Messages, whose `input_tokens` are those that no cache knows."""
+    """Read Anthropic Messages, whose `input_tokens` exclude cached ones."""
     content = _get(raw, "content")
     if not isinstance(content, list) or not all(isinstance(b, Mapping) for b in content):
         return None
@@ -431,7 +431,7 @@ def _anthropic(raw: object) -> Reply | None:
 
 
 def _gemini(raw: object) -> Reply | None:
-    """Read generateContent; without candidates it is empty if it says why or what it took."""
+    """Read generateContent; without candidates it is an empty reply if it has a reason or usage."""
     if not isinstance(raw, Mapping) or "candidates" not in raw:
         return None
     candidate = _get(raw, "candidates.0")
@@ -458,7 +458,7 @@ def _reply(
     usage: Usage | None = None,
     model: object = "",
 ) -> Reply:
-    """Return a reply in which characters that no file can hold (lone surrogates) are replaced."""
+    """Return a reply with lone surrogates, which no file can hold, replaced."""
     return Reply(
         text=well_formed(text),
         reasoning=well_formed(reasoning),
@@ -469,12 +469,12 @@ def _reply(
 
 
 def _finish(word: object) -> Finish:
-    """Return the end that a provider's word stands for."""
+    """Return the Finish for a provider's word."""
     return _FINISH.get(str(word).rpartition(".")[2].lower(), "unknown")
 
 
 def _parts(content: object) -> tuple[str, str]:
-    """Return text and thoughts of a content: a string, or a list of parts in any dialect."""
+    """Return text and thoughts of a content: a string, or a list of parts of any provider."""
     if isinstance(content, str):
         return content, ""
     texts: list[str] = []
@@ -490,8 +490,8 @@ def _parts(content: object) -> tuple[str, str]:
 
 
 def _get(raw: object, *paths: str) -> Any:
-    """Return the first value other than null that a path leads to, such as `choices.0.text`;
-    else None. The name 0 stands for the first item of a list.
+    """Return the first value other than null at one of the paths, such as `choices.0.text`, else
+    None. The name 0 stands for the first item of a list.
     """
     for path in paths:
         value = raw
@@ -506,7 +506,7 @@ def _get(raw: object, *paths: str) -> Any:
 
 
 def _count(raw: object, *paths: str) -> int | None:
-    """Return the first number of tokens that can be one; None, not known, where there is none."""
+    """Return the first plausible number of tokens, or None."""
     found = (_get(raw, path) for path in paths)
     counts = (count for count in found if isinstance(count, int) and not isinstance(count, bool))
     return next((count for count in counts if 0 <= count <= _MOST_TOKENS), None)

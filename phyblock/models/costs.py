@@ -1,7 +1,7 @@
 """Prices of models, estimates of the tokens of a call, and the cost limit of a run.
 
 Prices come from models.yaml, else from litellm's map of models, which is read as a file of the
-installed library: nothing heavy is imported. What neither knows is None, unknown.
+installed library, without importing it. Values that neither has are None, unknown.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ _HALVING_HOSTS = {
     "anthropic": "api.anthropic.com",
     "gemini": "generativelanguage.googleapis.com",
 }
-"""By provider: the host whose batches cost half, as their price lists of November 2026 say."""
+"""By provider: the host whose batches cost half, by its price list of November 2026."""
 _TYPICAL_REPLY_TOKENS = 500
 _TYPICAL_THINKING_TOKENS = 4_000
 _ROOM_TO_THINK_TOKENS = 8_192
@@ -52,11 +52,10 @@ _LEAST_EXPECTED_TOKENS = 1_000
 
 
 def tariff_of(config: ModelConfig) -> Tariff | None:
-    """Return the price of a model: its own, else that of litellm's map; None where neither knows
-    one. Baselines and recordings cost nothing.
+    """Return the price of a model: its own, else that of litellm's map, else None. Baselines and
+    recordings cost nothing.
 
-    Batches without a price of their own cost half at the provider's own address, and as other
-    calls elsewhere.
+    Batches without a price cost half at the provider's own address, and the full price elsewhere.
     """
     if config.kind != "litellm":
         return FREE
@@ -69,7 +68,7 @@ def tariff_of(config: ModelConfig) -> Tariff | None:
 
 
 def _halved(rate: _RateT) -> _RateT:
-    """Return the rate with half its price for batches, unless it has one for them."""
+    """Return the rate with half its price for batches, unless it has a price for them."""
     half = {name: None if usd is None else usd / 2 for name, usd in rate if name in _MAP_KEYS}
     return rate if rate.batch else rate.model_copy(update={"batch": Price.model_validate(half)})
 
@@ -82,14 +81,14 @@ def price_at(tariff: Tariff, prompt_tokens: int = 0, *, batched: bool = False) -
 
 
 def is_free(tariff: Tariff) -> bool:
-    """True if nothing is to be paid, whatever the prompt and however it is sent."""
+    """True if every call is free, for any prompt and in batches too."""
     rates = (tariff, *tariff.tiers)
     prices = [price for rate in rates for price in (rate, rate.batch) if price is not None]
     return not any(getattr(price, name) for price in prices for name in _MAP_KEYS)
 
 
 def cost_usd(tariff: Tariff | None, reply: Reply) -> float | None:
-    """Return US dollars of a reply; None when price or numbers of tokens are not known."""
+    """Return US dollars of a reply; None if price or numbers of tokens are unknown."""
     if tariff is None or is_free(tariff):
         return None if tariff is None else 0.0
     usage = reply.usage
@@ -105,8 +104,8 @@ def cost_usd(tariff: Tariff | None, reply: Reply) -> float | None:
 
 
 def is_billed(config: ModelConfig) -> bool:
-    """True if somebody may be billed for calls: not where the price is 0, nor by a local server
-    where no price is known and no key would be sent.
+    """True if calls may be billed: not at a price of 0, nor by a local server without a known
+    price and without a key.
     """
     tariff = tariff_of(config)
     if tariff is None:
@@ -125,8 +124,8 @@ def _map_entries() -> dict[str, dict[str, Any]]:
 
 
 def map_entry(config: ModelConfig) -> dict[str, Any]:
-    """Return what litellm's map says of a model, by full id, or by bare name where the provider is
-    the same; empty where it does not know it.
+    """Return the entry of a model in litellm's map, by full id, or by bare name if the provider is
+    the same; empty if there is none.
     """
     entries = _map_entries()
     if config.id in entries:
@@ -143,7 +142,7 @@ def mapped_providers() -> frozenset[str]:
 
 
 def _mapped_tariff(config: ModelConfig) -> Tariff | None:
-    """Return the price in the map; None where it knows none."""
+    """Return the price in the map, or None."""
     entry = map_entry(config)
     if isinstance(entry.get("tiered_pricing"), list):
         tiers = entry["tiered_pricing"]
@@ -163,7 +162,7 @@ def _mapped_tariff(config: ModelConfig) -> Tariff | None:
 
 
 def _mapped_price(entry: Mapping[str, Any], ending: str) -> dict[str, Any] | None:
-    """Return the price in the keys that end so; that of a cached prompt may lack the ending."""
+    """Return the price in the keys with this ending, which that of cached prompts may lack."""
     found = {name: entry.get(key + ending) for name, key in _MAP_KEYS.items()}
     usd = {name: float(n) * 1_000_000 for name, n in found.items() if n is not None}
     if "input" not in usd or "output" not in usd:
@@ -176,8 +175,8 @@ def _mapped_price(entry: Mapping[str, Any], ending: str) -> dict[str, Any] | Non
 class Budget:
     """A cost limit for a whole run: room is reserved before a call and settled after it.
 
-    What was spent never becomes less, and a cost that is not known counts as the most that was
-    reserved. Without `max_cost_usd` it only counts. `of_models` is what each model has cost before.
+    Spending never decreases, and an unknown cost counts as the whole reserve. Without
+    `max_cost_usd` it only counts. `of_models` is the earlier cost of each model.
     """
 
     def __init__(
@@ -186,7 +185,7 @@ class Budget:
         self.max_usd = math.inf if max_cost_usd is None else max_cost_usd
         self._of_models = dict(of_models or {})
         self.spent_usd = sum(self._of_models.values())
-        """The cost of settled calls, what was spent at the start included."""
+        """The cost of settled calls, including the cost at the start."""
         self.held_usd = 0.0
         self.holds = 0
         self.changed = asyncio.Event()
@@ -194,16 +193,16 @@ class Budget:
     def of(
         self, model: str, tariff: Tariff | None = None, max_cost_usd: float | None = None
     ) -> ModelBudget:
-        """Return the part of it that a model spends, which may have a limit of its own."""
+        """Return the budget of a model within it, which may have its own limit."""
         return ModelBudget(self, tariff, max_cost_usd, self._of_models.get(model, 0.0))
 
 
 class ModelBudget:
-    """The calls of one model within a run's budget, and what its replies show of its costs.
+    """The calls of one model within a run's budget, and what is learned from its replies.
 
-    The largest ratios of real to estimated tokens are remembered, of prompts and of replies, so
-    that a provider that counts higher is soon reserved for. Under a limit one call is sent first,
-    and then at most one more at once than have been settled: 1, 2, 4, ...
+    The largest ratios of real to estimated tokens are kept, for prompts and for replies, so that
+    reserves adapt to providers that count more. Under a limit, one call is sent first, and then at
+    most one more at once than have been settled: 1, 2, 4, ...
     """
 
     def __init__(
@@ -222,8 +221,8 @@ class ModelBudget:
         self.is_limited = min(self._max_usd, run.max_usd) < math.inf
 
     def most_usd(self, expected: Estimate, *, batched: bool = False) -> float | None:
-        """Return the most that a call can cost, as far as the model is known by now; None where no
-        price is.
+        """Return the most that a call can cost, by what is known of the model so far; None without
+        a price.
         """
         if self.tariff is None:
             return None
@@ -232,13 +231,13 @@ class ModelBudget:
         return most_usd(self.tariff, prompt, longest, batched=batched)
 
     async def reserve(self, most_usd: Callable[[], float], *, together: bool = False) -> int:
-        """Hold the most that a call can cost, waiting for calls under way to settle; return the
-        reservation's number.
+        """Reserve the most that a call can cost, waiting for calls in progress to settle if needed;
+        return the reservation's number.
 
-        `most_usd` is asked again whenever a call has settled, since more is known of the model
-        then. Calls that go out `together` do not wait for the first ones to tell. Raises
-        BudgetReachedError when it does not fit into the run's limit although nothing is under way,
-        UnavailableError when it does not fit into the model's own.
+        `most_usd` is computed again whenever a call has settled, since more is known of the model
+        then. Calls that are sent `together` do not wait for the first ones. Raises
+        BudgetReachedError if it exceeds the run's limit with no call in progress, UnavailableError
+        if it exceeds the model's own.
         """
         run = self._run
         while True:
@@ -261,7 +260,7 @@ class ModelBudget:
             await run.changed.wait()
 
     def hold(self, usd: float) -> int:
-        """Make a reservation, whether it fits or not; return its number."""
+        """Make a reservation even if it exceeds the limit; return its number."""
         self._next += 1
         self._held[self._next] = usd
         self._held_usd += usd
@@ -270,8 +269,8 @@ class ModelBudget:
         return self._next
 
     def settle(self, reservation: int, usd: float | None) -> float:
-        """Put the real cost in the place of a reservation; what is no amount counts all that was
-        held, as None does. Return what was counted [US dollars].
+        """Replace a reservation by the real cost; None, or an invalid amount, counts the whole
+        reservation. Return the counted amount [US dollars].
         """
         held = self._held.pop(reservation)
         self._under_way.discard(reservation)
@@ -280,7 +279,7 @@ class ModelBudget:
         self._spent_usd += counted
         run = self._run
         run.holds -= 1
-        # Rounding of a sum that goes up and down must not add up over a run.
+        # Rounding errors of the running sum must not add up over a run.
         self._held_usd = max(0.0, self._held_usd - held) if self._held else 0.0
         run.held_usd = max(0.0, run.held_usd - held) if run.holds else 0.0
         run.spent_usd += counted
@@ -288,7 +287,7 @@ class ModelBudget:
         return counted
 
     def learn(self, expected: Estimate, usage: Usage) -> None:
-        """Compare an estimate with plausible counts of the provider."""
+        """Compare an estimate with the provider's counts, if they are plausible."""
 
         def ratio(known: float, real: int | None, estimated: int) -> float:
             if real is None or estimated <= 0:
@@ -302,8 +301,8 @@ class ModelBudget:
 
 @dataclass(frozen=True)
 class Estimate:
-    """Tokens of a call that was not made yet: of the prompt, of a usual reply (with thoughts where
-    the model is told to think or has room for them), and of the longest one possible.
+    """Tokens of a future call: of the prompt, of a typical reply (with thoughts if the model is set
+    to think or has room for them), and of the longest possible one.
     """
 
     prompt_tokens: int
@@ -312,7 +311,7 @@ class Estimate:
 
 
 def estimate(config: ModelConfig, request: Request) -> Estimate:
-    """Estimate the tokens that the request would take."""
+    """Return an estimate of the tokens of a request."""
     texts, pictures = 0.0, 0
     for part in (part for message in request.messages for part in message.parts):
         if isinstance(part, Image):
@@ -333,8 +332,8 @@ def estimate(config: ModelConfig, request: Request) -> Estimate:
 def most_usd(
     tariff: Tariff, prompt_tokens: float, reply_tokens: int, *, batched: bool = False
 ) -> float:
-    """Return the most US dollars that a call can cost, all of its prompt put into a cache. There is
-    a margin on the prompt, as its tokens are estimated.
+    """Return the most US dollars that a call can cost, if all of its prompt is written to a cache.
+    The prompt has a margin, since its tokens are estimated.
     """
     prompt = prompt_tokens * _PROMPT_MARGIN
     # Longer prompts may be cheaper.
@@ -346,15 +345,15 @@ def most_usd(
 
 
 def may_be_billed(error: ModelError) -> bool:
-    """True if the server may have made a reply: it promised one, or was lost on the way."""
+    """True if the server may have made a reply: it indicated one, or the connection was lost."""
     return error.sent in ("lost", "maybe") or 200 <= (error.status or 0) < 300
 
 
 def counted(reply: Reply, expected: Estimate) -> Reply:
-    """Return the reply with the counts alone that can be true; the others are not known.
+    """Return the reply with only its plausible counts; the others become unknown.
 
-    Every request has a prompt, every reply that says something took tokens, and no call takes a
-    hundred times what was expected of it.
+    Every request has prompt tokens, every reply with text has reply tokens, and no call takes a
+    hundred times the expected ones.
     """
 
     def plausible(count: int | None, least: int, expected: int) -> int | None:
@@ -385,11 +384,11 @@ _PIECE = re.compile(
 
 
 def text_tokens(model_id: str, text: str) -> float:
-    """Return about how many tokens of a model a text is; `model_id` may name any provider.
+    """Return an estimate of a text's tokens; `model_id` may name any provider.
 
-    Words, runs of digits and of signs are counted, as tokenizers cut texts into them first: of the
-    bundled prompts they are within 1 % of the tokens of OpenAI's o200k. Anthropic's last published
-    vocabulary makes 3 % more of them. Google says that a token is about four characters.
+    It counts words and runs of digits and signs, into which tokenizers first split texts: for the
+    bundled prompts, the result is within 1 % of the tokens of OpenAI's o200k. Anthropic's last
+    published vocabulary makes 3 % more. Google says that a token is about four characters.
     """
     name = model_id.lower()
     if "gemini" in name or "gemma" in name:
@@ -404,11 +403,11 @@ def _pieces(text: str) -> int:
 
 @dataclass(frozen=True)
 class PictureRule:
-    """A provider's count of a picture: `plus`, and `each` for every square of `side` pixels on it.
+    """A provider's rule for picture tokens: `plus`, and `each` per square of `side` pixels.
 
-    It is scaled down before, until its sides are no longer than `longest` and `shortest` [pixels].
-    No more than `most` squares count; with `fit` it is scaled down until no more are needed, by its
-    `area` alone, or to whole `pixels` and whole squares.
+    The picture is first scaled down until its sides are at most `longest` and `shortest` [pixels].
+    At most `most` squares count; with `fit` the picture is scaled down to that number of squares,
+    by `area`, or to whole `pixels` and whole squares.
     """
 
     plus: float = 0
@@ -420,7 +419,7 @@ class PictureRule:
     fit: Literal["", "area", "pixels"] = ""
 
     def tokens(self, width: float, height: float) -> int:
-        """Return the tokens of a picture of so many pixels."""
+        """Return the tokens of a picture of this size [pixels]."""
 
         def squares() -> int:
             return math.ceil(width / self.side) * math.ceil(height / self.side)
@@ -432,7 +431,7 @@ class PictureRule:
         if self.fit == "pixels":
             width, height = max(1, round(width)), max(1, round(height))
             if squares() > self.most:
-                # No more than `most` squares cover it then, along one side exactly.
+                # At most `most` squares cover it then, exactly along one side.
                 scale = math.sqrt(self.side**2 * self.most / (width * height))
                 each = (side * scale / self.side for side in (width, height))
                 scale *= min(math.floor(along) / along or 1.0 for along in each)
@@ -442,7 +441,7 @@ class PictureRule:
 
 @functools.cache
 def _picture_rules() -> list[tuple[re.Pattern[str], dict[str, PictureRule]]]:
-    """Read pictures.yaml: rules by detail, "" the usual one, each with the names that it is for."""
+    """Read pictures.yaml: for each pattern of names the rules by detail, "" for the default."""
     rules = []
     for entry in read_own_yaml(Path(__file__).with_name("pictures.yaml")):
         by_name = {"": entry["usual"], **entry.get("details", {})}.items()
@@ -455,7 +454,7 @@ def _picture_rules() -> list[tuple[re.Pattern[str], dict[str, PictureRule]]]:
 
 
 def picture_tokens(model_id: str, image: Image, detail: ImageDetail | None = None) -> int:
-    """Return the tokens of a picture in a detail, or in the provider's default.
+    """Return the tokens of a picture at a detail, or at the provider's default.
 
     `model_id` may name any provider that serves the model.
     """

@@ -1,4 +1,4 @@
-"""A model's part of the environment: its key, which no text may hold, and its server."""
+"""Environment variables of a model: its key, which no text may contain, and its server."""
 
 from __future__ import annotations
 
@@ -37,14 +37,14 @@ _ADDRESS_VARIABLES: Mapping[str, tuple[str, ...]] = {
 _OWN_CREDENTIALS = (
     "azure", "bedrock", "github_copilot", "oci", "sagemaker", "vertex_ai", "watsonx",
 )  # fmt: skip
-"""Providers that can sign in without an API key: litellm finds out by itself."""
+"""Providers that can sign in without an API key, which litellm handles by itself."""
 
 KEYLESS = ("hosted_vllm", "lm_studio", "llamafile", "ollama", "ollama_chat")
-"""Local servers, which take a key but need none."""
+"""Local servers, which accept a key but need none."""
 
 _PLACEHOLDER = "no-key"
 _PLACEHOLDERS = (_PLACEHOLDER, "empty", "none", "null", "dummy", "test")
-"""Placeholders for a key that a server does not need, in lower case; they are no secrets."""
+"""Placeholders for an unneeded key, in lower case; they are not secrets."""
 
 _CALLED_SECRET = re.compile(
     r"(?:^|_|API)(?:KEY|TOKEN|SECRET|PASSW(?:OR)?D|CREDENTIALS?|JWT)(?:_|$)", re.IGNORECASE
@@ -62,8 +62,8 @@ _LOOKS_SECRET = re.compile(
 class KeyStatus:
     """The state of a model's key.
 
-    `variables` are the environment variables looked at, in order; `is_set` is True if one holds a
-    key, `is_needed` if calls fail without; `fault` is what keeps the key that is set from being
+    `variables` are the environment variables that are checked, in order; `is_set` is True if one
+    holds a key, `is_needed` if calls fail without; `fault` is the reason why the key cannot be
     sent, or "".
     """
 
@@ -74,7 +74,7 @@ class KeyStatus:
 
 
 def api_key_status(config: ModelConfig) -> KeyStatus:
-    """Look in the environment for the model's key."""
+    """Return the state of the model's key in the environment."""
     if config.kind != "litellm":
         return KeyStatus((), is_set=False, is_needed=False)
     variables = _variables(config)
@@ -91,8 +91,8 @@ def api_key_status(config: ModelConfig) -> KeyStatus:
 def api_key(config: ModelConfig) -> str | None:
     """Return the key to send; None leaves it to litellm (providers with their own credentials).
 
-    A server named by `api_base` gets a placeholder when no key is set, as clients insist on one.
-    Raises UnavailableError when a key is needed and not set, or when no header can carry it.
+    A server named by `api_base` gets a placeholder if no key is set, since clients require one.
+    Raises UnavailableError if a key is needed and not set, or no header can carry it.
     """
     status = api_key_status(config)
     if status.fault:
@@ -108,10 +108,10 @@ def api_key(config: ModelConfig) -> str | None:
 
 
 def server_address(model_id: str) -> str | None:
-    """Return the address of the model's server that the environment names, or None.
+    """Return the address of the model's server in the environment, or None.
 
-    litellm would find it too, but unseen: replies of two servers must not pass for one another's.
-    Raises SpecError for what is no address, or may hold a key or a password: it is kept and shown.
+    litellm would find it too, but then replies of two servers could be confused. Raises SpecError
+    if it is not an address, or may contain a key or a password, since it is stored and shown.
     """
     provider = model_id.partition("/")[0]
     usual = f"{provider.upper().replace('-', '_')}_API_BASE"
@@ -126,12 +126,12 @@ def server_address(model_id: str) -> str | None:
 
 
 def secrets_of(config: ModelConfig) -> tuple[str, ...]:
-    """Return the values that no stored text may hold, the longest first.
+    """Return the values that no stored text may contain, longest first.
 
-    They are the model's key, and whatever the environment calls a key, token, secret, password or
-    credential: litellm signs in with many of them. Values of fewer than 4 characters (8, where they
-    are not the model's key) and usual words for "no key" are none: to take them out of all text
-    would ruin the text and hide nothing.
+    They are the model's key, and all environment variables named as a key, token, secret, password
+    or credential, since litellm signs in with many of them. Values of fewer than 4 characters (8
+    for others than the model's key) and common words for "no key" are excluded: removing them would
+    ruin texts and hide nothing.
     """
     own = _variables(config)
     secrets = {
@@ -152,7 +152,7 @@ def _variables(config: ModelConfig) -> tuple[str, ...]:
 
 
 def _found(variables: tuple[str, ...]) -> tuple[str, str] | None:
-    """Return the first variable that holds a key, and that key without white space around it."""
+    """Return the first variable that holds a key, and the key without surrounding white space."""
     values = ((name, os.environ.get(name, "").strip()) for name in variables)
     return next((found for found in values if found[1]), None)
 
@@ -160,9 +160,9 @@ def _found(variables: tuple[str, ...]) -> tuple[str, str] | None:
 def hidden(text: str, secrets: Iterable[str], *, guess: bool = True) -> str:
     """Return `text` with every secret masked, whether plain or escaped (JSON, HTML, URL, base64).
 
-    A secret of fewer than 8 characters is masked where it stands as a word: as part of a longer
-    word it is chance. With `guess`, which is for messages and not for replies, what looks like a
-    key goes too, and the beginning of a secret at the very end of the text, where it was cut.
+    A secret of fewer than 8 characters is masked only as a whole word: inside a longer word it is a
+    coincidence. With `guess`, for messages and not for replies, text that looks like a key is also
+    masked, and the beginning of a secret at the very end of the text, where it was cut.
     """
     known = tuple(secrets)
     for form in _forms(known):
@@ -182,11 +182,11 @@ def hidden(text: str, secrets: Iterable[str], *, guess: bool = True) -> str:
 
 @functools.lru_cache(maxsize=64)
 def _forms(secrets: tuple[str, ...]) -> tuple[str, ...]:
-    """List every way in which a server, a library or a log may write one of the secrets.
+    """Return all forms in which a server, a library or a log may write one of the secrets.
 
-    The longest come first, as one may begin another. In base64 a secret stands wherever it is in
-    the encoded bytes, `user:key` included; the characters at either end that also depend on its
-    neighbours are left out.
+    The longest come first, since one may begin another. In base64 a secret is found at any place in
+    the encoded bytes, also in `user:key`; the characters at either end that also depend on its
+    neighbors are omitted.
     """
     forms: set[str] = set()
     for secret in secrets:

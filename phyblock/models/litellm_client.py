@@ -1,9 +1,9 @@
 """Calls through litellm, by its public arguments: one request each, its own retries off.
 
-litellm is given the client that it sends with, over our HTTP client: what it sends follows no
-redirect, is read up to the same limit, and is sent once. Its settings, loggers and classes stay as
-they are. It takes seconds to import, so it is imported by the first call and never by a run whose
-replies are all cached, recorded or made by baselines. The only module that imports it.
+litellm sends through a client over phyblock's HTTP client: its requests follow no redirect, are
+read up to the same limit, and are sent once. Its settings, loggers and classes are not changed. It
+takes seconds to import, so it is imported by the first call, and never by a run whose replies are
+all cached, recorded or made by baselines. This is the only module that imports it.
 """
 
 from __future__ import annotations
@@ -41,10 +41,10 @@ if TYPE_CHECKING:
     import httpx
 
 _GRACE_S = 10.0
-"""Time that litellm's own work may take beyond that of the exchange [s]."""
+"""Time that litellm's own work may take beyond the exchange [s]."""
 
 _MOST_ERROR_BYTES = 10_000
-"""The part of an error's body that litellm sees, which looks for keys in it again and again."""
+"""The part of an error's body that litellm gets, since it searches it for keys repeatedly."""
 
 _WHILE_IMPORTED = {
     "LITELLM_LOCAL_MODEL_COST_MAP": "True",  # else the import fetches the price map
@@ -55,14 +55,14 @@ _OWN_CLIENTS = (
     "aiohttp_openai", "amazon_nova", "cloudflare", "cohere", "cohere_chat", "maritalk", "nlp_cloud",
     "oobabooga", "petals", "predibase", "replicate",
 )  # fmt: skip
-"""Providers whose code in litellm sends with an HTTP client of its own. They are called all the
-same: litellm then decides about redirects, sizes and what is sent twice.
+"""Providers whose code in litellm sends with its own HTTP client. They can be used, but litellm
+then decides about redirects, sizes and repeated requests.
 """
 
 
 @dataclass
 class _Exchange:
-    """The traffic of one call: the last answer, or why there is none that may be read."""
+    """The traffic of one call: the last answer, or the reason why there is none."""
 
     http: HttpClient
     answer: Answer | None = None
@@ -74,13 +74,13 @@ _CURRENT: ContextVar[_Exchange] = ContextVar("phyblock_exchange")
 
 
 class LitellmClient(Client):
-    """`litellm.acompletion`, for every provider it knows, over our HTTP client."""
+    """`litellm.acompletion`, for every provider it knows, over phyblock's HTTP client."""
 
     _sender: Any = None
 
     @cached_property
     def takes_seed(self) -> bool:
-        """True if seeds are sent; left open, where litellm knows the provider to take them."""
+        """True if seeds are sent; by default if litellm knows that the provider accepts them."""
         if self.config.seed != "auto":
             return self.config.seed == "always"
         return "seed" in (_litellm().get_supported_openai_params(model=self.config.id) or ())
@@ -128,7 +128,7 @@ class LitellmClient(Client):
         return read_completion(body, latency_s, exchange.answer.status if exchange.answer else 200)
 
     def _after(self, error: Exception, exchange: _Exchange, latency_s: float) -> Reply:
-        """Raise the error of a failed call by what was on the wire, or return the reply there."""
+        """Return the reply on the wire of a failed call, or raise its error."""
         if exchange.failure is not None:
             raise exchange.failure from None
         answer = exchange.answer
@@ -137,7 +137,7 @@ class LitellmClient(Client):
             status = getattr(error, "status_code", None) or 500
             raise error_of(Answer(status, {}, said.encode())) from None
         if answer is None:
-            # A package, a credential or a setting is missing here: no request would fare better.
+            # A package, a credential or a setting is missing: every request would fail.
             raise UnavailableError(said, sent="no") from None
         if not answer.is_success:
             failure = error_of(answer)
@@ -152,14 +152,14 @@ class LitellmClient(Client):
 
 
 def _sender(config: ModelConfig) -> Any:
-    """Return an OpenAI client and a handler of litellm in one: it takes either."""
+    """Return an OpenAI client that is also a handler of litellm, which accepts either."""
     import httpx
     import openai
     from litellm.llms.custom_httpx.http_handler import AsyncHTTPHandler
 
     class Wire(httpx.AsyncBaseTransport):
-        """Sends through the exchange of the task; ReadError stands for every failure, after which
-        litellm sends nothing again.
+        """Sends through the exchange of the task; every failure is a ReadError, after which
+        litellm does not retry.
         """
 
         async def handle_async_request(self, request: httpx.Request) -> httpx.Response:
@@ -168,7 +168,7 @@ def _sender(config: ModelConfig) -> Any:
                 answer = await _send(exchange, config, request)
             except Exception as failure:
                 exchange.failure = failure
-                # Its own words may hold what litellm must not log.
+                # Its message may contain what litellm must not log.
                 raise httpx.ReadError("the call failed", request=request) from None
             exchange.answer = answer
             unpacked = ("content-encoding", "content-length", "transfer-encoding")
@@ -206,7 +206,7 @@ def _sender(config: ModelConfig) -> Any:
 
 
 async def _send(exchange: _Exchange, config: ModelConfig, request: httpx.Request) -> Answer:
-    """Send what litellm wants to send, if it goes to the model's server, and once."""
+    """Send litellm's request, once, and only to the model's server."""
     url, method = str(request.url), request.method
     if config.api_base is not None and urlsplit(url)[:2] != urlsplit(config.api_base)[:2]:
         why = f"nothing is sent to {urlsplit(url).hostname}, which is not the model's server"
@@ -224,7 +224,7 @@ async def _send(exchange: _Exchange, config: ModelConfig, request: httpx.Request
 
 @cache
 def _litellm() -> Any:
-    """Import litellm; the environment is as it was when that is done."""
+    """Import litellm, and restore the environment afterwards."""
     before = {name: os.environ.pop(name, None) for name in _WHILE_IMPORTED}
     os.environ.update(_WHILE_IMPORTED)
     try:
@@ -244,16 +244,15 @@ _is_quiet = False
 
 
 def be_quiet() -> None:
-    """Keep litellm from printing, in programs that consist of phyblock alone, such as its
-    commands."""
+    """Keep litellm from printing, in programs that are phyblock's own, such as its commands."""
     global _is_quiet
     _is_quiet = True
 
 
 def known_providers(config: ModelConfig) -> frozenset[str]:
-    """Return known providers, among them that of the model if it is known.
+    """Return known providers, including that of the model if it is known.
 
-    litellm is imported only where its map has neither the model nor another of its provider.
+    litellm is imported only if its map has neither the model nor another of its provider.
     """
     at_hand = frozenset((*DIRECT_PROVIDERS, *KEYLESS))
     if config.provider in at_hand or map_entry(config) or config.provider in mapped_providers():

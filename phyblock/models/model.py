@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from phyblock.models.batch import BatchFiles
 
 _SCHEMA_PROVIDERS = ("predibase", "fireworks_ai", "lm_studio", "nebius", "databricks")
-"""Providers whose models, as litellm knows, all accept a schema."""
+"""Providers whose models all accept a schema according to litellm."""
 
 WINDOW_S = 60.0
 _NAP_S = 1.0
@@ -44,7 +44,7 @@ _NAP_S = 1.0
 
 @dataclass(frozen=True)
 class Clock:
-    """Time as limits, retries and servers see it; tests give their own."""
+    """The clock of limits, retries and servers, which tests replace."""
 
     now: Callable[[], float] = time.monotonic
     sleep: Callable[[float], Awaitable[None]] = asyncio.sleep
@@ -52,18 +52,18 @@ class Clock:
 
 @dataclass
 class Started:
-    """A request that was started: when [s], and how many tokens it counts for."""
+    """A started request: its time [s], and its tokens for the limit."""
 
     at_s: float
     tokens: int
 
 
 class Limits:
-    """All limits of one model: requests under way, and requests and tokens in any 60 s.
+    """All limits of one model: requests in progress, and requests and tokens in any 60 s.
 
-    A request larger than `tpm` by itself is let through when nothing was started for a minute, or
-    it could never start. `overall` is shared by all models of a run; `rest_s` says how long no
-    server of the model is to be asked, as after a 429.
+    A single request larger than `tpm` is admitted when nothing was started for a minute, or it
+    could never start. `overall` is shared by all models of a run; `rest_s` returns how long no
+    server of the model may be asked, as after a 429.
     """
 
     def __init__(
@@ -90,13 +90,13 @@ class Limits:
     async def slot(self, tokens: int) -> AsyncIterator[Started]:
         """Hold a place of the model and of the whole run; `tokens` is the estimate for tpm.
 
-        Requests are admitted one after the other; a model that waits for its minute holds no place
-        that another could use.
+        Requests are admitted one after another; a model that waits for its minute holds no place
+        that another model could use.
         """
         async with self._under_way:
             async with self._admission:
                 while (wait_s := max(self._rest_s(), self._window_s(tokens))) > 0:
-                    # In naps, as a server that rests may be heard of earlier.
+                    # In short waits, since a resting server may answer earlier.
                     await self._clock.sleep(min(wait_s, _NAP_S))
                 await self._overall.acquire()
                 started = Started(self._clock.now(), tokens)
@@ -108,13 +108,13 @@ class Limits:
                 self._overall.release()
 
     def settle(self, started: Started, tokens: int) -> None:
-        """Put the tokens that a request really took in the place of the estimate."""
+        """Replace the estimate by the tokens that a request really took."""
         if started.at_s > self._clock.now() - WINDOW_S:
             self._tokens += tokens - started.tokens
             started.tokens = tokens
 
     def _window_s(self, tokens: int) -> float:
-        """Return the seconds until a request of so many tokens may start."""
+        """Return the seconds until a request of this many tokens may start."""
         now = self._clock.now()
         while self._started and self._started[0].at_s <= now - WINDOW_S:
             self._tokens -= self._started.popleft().tokens
@@ -134,10 +134,10 @@ EventKind = Literal["retry", "batch"]
 
 @dataclass(frozen=True)
 class ModelEvent:
-    """An event of a model that a user may want to see.
+    """An event of a model to show to the user.
 
-    `retry`: a request failed, with `status` if the server gave one, and is sent again after
-    `wait_s`; `batch`: one was sent, is waited for or has ended. `message` is safe to show.
+    `retry`: a request failed, with `status` if the server sent one, and is sent again after
+    `wait_s`; `batch`: a batch was sent, is in progress or has ended. `message` is safe to show.
     """
 
     model: str
@@ -150,20 +150,20 @@ class ModelEvent:
 Observer = Callable[[ModelEvent], None]
 
 Report = Callable[[str], None]
-"""Called with what concerns no single model: a server that is gone, a cache that fails."""
+"""A callback for notices about the whole run, such as an unreachable server or a failed cache."""
 
 
 @dataclass(frozen=True)
 class RetryPolicy:
     """Limits on how often and how long a request is sent again.
 
-    A request is given up when it has failed `attempts` times and `retry_for_s` have passed since
-    it first failed, both. HTTP 2xx with an unreadable body is an answer that was paid for: there
-    the number alone decides.
+    A request is given up only when it has failed `attempts` times and `retry_for_s` have passed
+    since its first failure. An answer with HTTP 2xx and an unreadable body was paid for, so only
+    the number of attempts applies.
 
     The wait before attempt n + 1 is uniform between 0 and min(`max_wait_s`, `base_s` * 2^(n-1)),
-    on top of the server's `Retry-After` (followed up to `max_retry_after_s`). A server that has not
-    answered once is given up after `max_connection_failures` tries: its address is probably wrong.
+    on top of the server's `Retry-After` (followed up to `max_retry_after_s`). A server that has
+    never answered is given up after `max_connection_failures` tries: its address is probably wrong.
     """
 
     attempts: int = 8
@@ -175,12 +175,12 @@ class RetryPolicy:
     clock: Clock = field(default_factory=Clock)
 
     def gives_up(self, error: ModelError, failures: int, failing_for_s: float) -> bool:
-        """Return True if what failed so often and so long is not tried again."""
+        """True if a request is given up after this many failures in this time."""
         is_success = error.status is not None and 200 <= error.status < 300
         return failures >= self.attempts and (is_success or failing_for_s >= self.retry_for_s)
 
     def followed_s(self, error: ModelError) -> float:
-        """Return how much of the wait that the server asked for is followed [s]."""
+        """Return the part of the server's requested wait that is followed [s]."""
         return min(getattr(error, "retry_after_s", None) or 0.0, self.max_retry_after_s)
 
     def retrying(
@@ -188,10 +188,10 @@ class RetryPolicy:
         on_retry: Callable[[RetryableError, float], None],
         is_over: Callable[[], bool] = lambda: False,
     ) -> AsyncRetrying:
-        """Return tenacity's loop for one request: it goes on after a RetryableError alone.
+        """Return tenacity's loop for one request, which continues only after a RetryableError.
 
-        `on_retry` is called with the error and the wait [s] before each wait; once `is_over`,
-        nothing is tried again.
+        `on_retry` is called with the error and the wait [s] before each wait; nothing is retried
+        once `is_over` returns true.
         """
         first_failure_s: list[float] = []
 
@@ -226,7 +226,7 @@ class RetryPolicy:
 
 FAILURES_TO_REST = 5
 _REQUESTS_TO_REST = 2
-"""One request that a server cannot survive is no outage."""
+"""Failed requests that count as an outage: a single one may itself crash the server."""
 _LONGEST_REST_S = 15.0
 _GATEWAY = (502, 503, 504)
 _TOO_MUCH = (429, 529)
@@ -234,8 +234,9 @@ _TOO_MUCH = (429, 529)
 
 @dataclass(eq=False)
 class Server:
-    """One server: `failures` in a row, of the requests `failed`, show that it is away, since
-    `away_since_s`; it has rested `rests` times since. `refusal` is why it is asked no more.
+    """One server. After `failures` in a row, of the requests `failed`, it counts as away since
+    `away_since_s`, and has rested `rests` times. `refusal` is the reason why it is not used any
+    more.
     """
 
     name: str
@@ -253,12 +254,11 @@ class Server:
 
 
 class Servers:
-    """Chooses among the servers of a model: the least loaded, while one that fails rests.
+    """Chooses among the servers of a model: the least loaded one that is not resting.
 
-    What a server says itself, an error 500 or a 429 too, shows that it is there. No connection, a
-    lost one, or a gateway that finds nothing behind it (502, 503, 504) shows that it is not. An
-    answer that does not come in time shows neither: some requests are slow. `report` is called with
-    what happens to them.
+    An answer of the server itself, even an error 500 or 429, shows that it is up. A failed or lost
+    connection, or a gateway error (502, 503, 504), shows that it is down. A timeout shows neither:
+    some requests are slow. `report` is called with a sentence on changes.
     """
 
     def __init__(
@@ -269,21 +269,21 @@ class Servers:
         self._report = report
 
     def usable(self) -> list[Server]:
-        """List the servers that are not given up; raises UnavailableError when there is none."""
+        """Return the servers that are not given up. Raises UnavailableError if there are none."""
         usable = [server for server in self.all if server.refusal is None]
         if not usable and (refusal := self.all[-1].refusal) is not None:
             raise UnavailableError(str(refusal), status=refusal.status, sent=refusal.sent)
         return usable
 
     def rest_s(self) -> float:
-        """Return the seconds until some server may be asked; UnavailableError when none is left."""
+        """Return the seconds until a server may be asked; raises UnavailableError as `usable`."""
         return max(0.0, min(s.rests_until_s for s in self.usable()) - self._policy.clock.now())
 
     def pick(self, failed: Server | None = None) -> Server:
-        """Return the server to ask: one that does not rest and has the fewest requests under way.
+        """Return the server to ask: the one with the fewest requests in progress, not resting.
 
-        One that just `failed` the request is asked only where there is no other. One that was away
-        is asked by a single request at a time, until it answers.
+        A server that just `failed` the request is asked only if there is no other. A server that
+        was away gets a single request at a time until it answers.
         """
         now_s = self._policy.clock.now()
         chosen = min(
@@ -295,7 +295,7 @@ class Servers:
         return chosen
 
     def heard(self, server: Server) -> None:
-        """Note that a server answered."""
+        """Record that a server answered."""
         if server.rests:
             lasted_s = self._policy.clock.now() - server.away_since_s
             self._report(f"{server.name} answers again after {lasted_s:.0f} s")
@@ -304,10 +304,10 @@ class Servers:
         server.failed.clear()
 
     def failed(self, server: Server, error: ModelError, request: Hashable, sent_s: float) -> bool:
-        """Note that a request that was sent at `sent_s` failed; True if that is the server's fault,
-        so that another attempt is free.
+        """Record that a request sent at `sent_s` failed. True if that is the server's fault, so
+        that another attempt is free.
 
-        Requests that were sent before a server began to rest tell nothing new when they fail.
+        Failures of requests that were sent before a server began to rest are ignored.
         """
         if isinstance(error, UnavailableError):
             self._refuse(server, error)
@@ -342,7 +342,7 @@ class Servers:
         return True
 
     def pause(self, server: Server, error: RetryableError, wait_s: float) -> None:
-        """Stop using a server that reports overload, for a while."""
+        """Let a server that reports overload rest for a while."""
         if error.status in _TOO_MUCH:
             until_s = self._policy.clock.now() + wait_s
             server.rests_until_s = max(server.rests_until_s, until_s)
@@ -359,8 +359,8 @@ class Servers:
 
 @dataclass
 class _Call:
-    """A request with what it is expected to take, how often it was sent, what that cost, and the
-    server that failed last. `is_cancelled`: it is not sent again.
+    """A request with its estimate, attempts, cost, and the server that failed last. If
+    `is_cancelled`, it is not sent again.
     """
 
     request: Request
@@ -390,12 +390,11 @@ class ChatModel:
         self.name = self.config.name
 
     async def ask(self, request: Request) -> Reply:
-        """Return the cached reply, or a new one, which is then cached if it is whole.
+        """Return the cached reply, or a new one, which is then cached if it is complete.
 
-        `cost_usd` of a cached reply is what it would cost today. Raises what the model seam says,
-        and BudgetReachedError when the call does not fit.
+        `cost_usd` of a cached reply is what it would cost today. Raises as `Model.ask`.
 
-        Cancelled while it waits, it gives up at once. Cancelled while a request is under way, which
+        When cancelled while it waits, it gives up at once. When cancelled during a request, which
         is paid for, it returns the answer; a second cancellation gives that up too.
         """
         is_keyed = self.cache is not None or self.journal is not None
@@ -414,7 +413,7 @@ class ChatModel:
 
     @property
     def under_way(self) -> int:
-        """Requests that were sent and are not answered."""
+        """Number of requests without an answer yet."""
         return sum(server.under_way for server in self.servers.all)
 
     async def aclose(self) -> None:
@@ -423,7 +422,7 @@ class ChatModel:
             await server.client.aclose()
 
     async def _ask(self, request: Request, key: str) -> Reply:
-        """Send until answered; whatever ends it, what was billed is reported."""
+        """Send until answered; however it ends, the billed cost is reported."""
         call = _Call(request, key, estimate(self.config, request))
 
         def on_retry(error: RetryableError, wait_s: float) -> None:
@@ -437,14 +436,14 @@ class ChatModel:
                     return await self._attempt(call)
         except ModelError as error:
             if call.is_cancelled and isinstance(error, RetryableError):
-                # It would have been sent again.
+                # It would otherwise be sent again.
                 raise asyncio.CancelledError from None
             error.billed_usd = call.billed_usd
             raise
         raise AssertionError("tenacity neither returned nor raised")
 
     async def _attempt(self, call: _Call) -> Reply:
-        """Send once, at a server that does not refuse everything."""
+        """Send once, to a server that does not refuse every request."""
         expected, who = call.expected, (self.name, call.request.key, call.request.seed)
         while True:
             async with self.limits.slot(
@@ -468,7 +467,7 @@ class ChatModel:
                 return reply
 
     async def _send(self, call: _Call, server: Server) -> Reply:
-        """Send with the call's greatest cost reserved in the budget."""
+        """Send with the call's highest cost reserved in the budget."""
         held = None
         if self.budget.tariff is not None:
             held = await self.budget.reserve(lambda: self.budget.most_usd(call.expected) or 0.0)
@@ -480,10 +479,10 @@ class ChatModel:
             return await exchange
 
     async def _exchange(self, call: _Call, server: Server, held: int | None) -> Reply:
-        """Write that a call is sent, send it, and write what became of it.
+        """Write that a call is sent, send it, and write its end.
 
-        A failure that may have been billed counts in full; a model that is found unable before
-        anything is sent, and a bug of ours, which ends the run, cost nothing.
+        A failure that may have been billed counts in full; a failure before anything is sent, and
+        an internal error, which ends the run, cost nothing.
         """
         written: Call | None = None
         reply: Reply | None = None
@@ -528,10 +527,10 @@ class ChatModel:
 
 
 def takes_format(config: ModelConfig) -> bool:
-    """Return True if a model is taken to accept a JSON schema as `response_format`.
+    """True if a model is assumed to accept a JSON schema as `response_format`.
 
     Self-hosted servers that speak the OpenAI protocol (vLLM, SGLang, llama.cpp, LM Studio, Ollama)
-    do; of all others litellm's map of models is believed.
+    do; for all others litellm's map of models decides.
     """
     is_own = config.provider in DIRECT_PROVIDERS and bool(config.addresses)
     is_known = is_own or config.provider in _SCHEMA_PROVIDERS
@@ -550,10 +549,10 @@ def build_model(
     policy: RetryPolicy | None = None,
     batches: BatchFiles | None = None,
 ) -> Model:
-    """Return the model that a configuration describes; nothing is imported or sent before it asks.
+    """Return the model of a configuration; nothing is imported or sent before its first request.
 
-    `overall` bounds what all models of a run have under way together; `observer` hears of the
-    model, `report` of its servers. `batches` is where a model that is asked so keeps them. Raises
+    `overall` bounds the requests in progress of all models of a run; `observer` gets events of the
+    model, `report` notices about its servers. `batches` are the files of its batches. Raises
     SpecError for an unknown baseline, a model without a price under a limit or a provider without
     batches, DataError for missing recordings.
     """

@@ -1,4 +1,4 @@
-"""Recorded replies and baselines, which answer in the place of a model."""
+"""Recorded replies and baselines, which answer instead of a model."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _FREE = {"cost_usd": 0.0, "attempts": 0, "cached": False}
 class LocalModel:
     """A model that answers without a network and for free: recorded replies, or a rule.
 
-    It looks at no prompt and no picture, and so none is made for it.
+    It uses no prompt and no picture, so none is made for it.
     """
 
     needs_messages = False
@@ -35,23 +35,23 @@ class LocalModel:
         self._answer = answer
 
     async def ask(self, request: Request) -> Reply | None:
-        """Return the answer to the request; None where nothing was recorded.
+        """Return the answer to the request, or None if nothing was recorded.
 
-        Raises the error that was recorded; DataError for a recording that cannot be read, or an
-        oracle that lacks a candidate; SpecError for a track that a baseline has no rule for.
+        Raises the recorded error; DataError for an unreadable recording, or if an oracle lacks a
+        candidate; SpecError for a track that a baseline has no rule for.
         """
         reply = self._answer(request)
         return None if reply is None else reply.model_copy(update=_FREE)
 
     async def aclose(self) -> None:
-        """Nothing is held open."""
+        """Do nothing: nothing is held open."""
 
 
 def open_replay(config: ModelConfig) -> LocalModel:
-    """Open the recording that a configuration names.
+    """Open the recording of a configuration.
 
     A folder with `records.jsonl` is a run of phyblock, any other a folder of raw replies. Raises
-    DataError when there is no such folder, or no JSON in it.
+    DataError if there is no such folder, or no JSON in it.
     """
     folder = config.recording
     if folder is None or not folder.is_dir():
@@ -76,10 +76,10 @@ def open_replay(config: ModelConfig) -> LocalModel:
 
 
 def open_baseline(config: ModelConfig) -> LocalModel:
-    """Return the baseline that a configuration names; SpecError where there is none.
+    """Return the baseline of a configuration. Raises SpecError if there is none.
 
-    What it draws depends on its name, the seed and the request's key alone, not on the order in
-    which it is asked.
+    Its random numbers depend only on its name, the seed and the request's key, not on the order of
+    requests.
     """
     name = config.name
     if name not in baseline_names():
@@ -98,7 +98,7 @@ def open_baseline(config: ModelConfig) -> LocalModel:
 
 
 def _read_file(folder: Path, request: Request) -> Reply | None:
-    """Return the raw reply in `<key>.json`, whatever the seed."""
+    """Return the raw reply in `<key>.json`, for any seed."""
     path = folder / f"{request.key}.json"
     if not path.is_file():
         return None

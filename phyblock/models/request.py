@@ -1,8 +1,8 @@
-"""Requests, the seam of all that answers them, and the JSON of the OpenAI chat protocol.
+"""Requests, the protocol of models, and the JSON of the OpenAI chat protocol.
 
-`wire_messages` gives messages as litellm takes them, `json_body` a whole request body as bytes;
-both say the same. Pictures make up nearly all of a body, so they enter it without passing through
-the JSON encoder: base64 has nothing to escape.
+`wire_messages` returns messages for litellm, `json_body` a whole request body as bytes; both have
+the same content. Pictures make up nearly all of a body, so they bypass the JSON encoder: base64 has
+nothing to escape.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from phyblock.text import hex_digest
 from phyblock.types import ImageDetail, Role
 
 _MARK = secrets.token_hex(16)
-"""Stands for a picture in a body until it is put in: no text holds it, as nobody knows it."""
+"""Random placeholder of a picture in a body, which no text can contain."""
 _MAGIC = (
     (b"\x89PNG\r\n\x1a\n", "image/png"),
     (b"\xff\xd8\xff", "image/jpeg"),
@@ -34,7 +34,7 @@ _MAGIC = (
 
 @dataclass(frozen=True)
 class Image:
-    """An encoded picture as sent; `label` says what it shows ("goal", "candidates", ...)."""
+    """An encoded picture as sent; `label` is "goal", "candidates", ..."""
 
     data: bytes = field(repr=False)
     label: str
@@ -48,10 +48,10 @@ class Image:
 
     @functools.cached_property
     def data_uri(self) -> str:
-        """The picture as a `data:` URI, its type by the bytes themselves: providers refuse a label
-        that they do not bear out. Kept, as one picture is sent to several models.
+        """The picture as a `data:` URI, with the type from its bytes, since providers refuse a
+        wrong type. It is cached, since one picture is sent to several models.
 
-        Raises DataError when the picture is none of PNG, JPEG, GIF and WebP.
+        Raises DataError if the picture is not PNG, JPEG, GIF or WebP.
         """
         mime = next((name for magic, name in _MAGIC if self.data.startswith(magic)), "")
         if self.data[:4] == b"RIFF" and self.data[8:12] == b"WEBP":
@@ -74,10 +74,10 @@ class Message:
 class Request:
     """One question to a model.
 
-    `key` names the question inside its `track`: by both a recording is looked up. `params` are
-    sampling parameters by their OpenAI names; `prompt_version` hashes the template; `subject` is
-    what baselines look at, of the type that its track says. `response_format` asks for JSON, None
-    for text. `sample` names what it is made for.
+    `key` names the question inside its `track`; recordings are looked up by both. `params` are
+    sampling parameters by their OpenAI names; `prompt_version` is a digest of the template;
+    `subject` is the input of baselines, whose type depends on the track. `response_format` asks for
+    JSON, None for text. `sample` is the id of its sample.
     """
 
     key: str
@@ -102,25 +102,25 @@ class Model(Protocol):
 
     @property
     def name(self) -> str:
-        """The name the tables use."""
+        """Its name in tables."""
 
     @property
     def needs_messages(self) -> bool:
         """True if prompts and pictures must be made for it.
 
-        False for recordings, which are looked up by a request's key (what was asked when they were
-        made is not known), and for baselines, which look at the request's subject alone.
+        False for recordings, which are looked up by a request's key (their original prompts are not
+        known), and for baselines, which use only the request's subject.
         """
 
     async def ask(self, request: Request) -> Reply | None:
-        """Answer, or None when a recording holds no reply for the request.
+        """Return the reply, or None if a recording has none for the request.
 
-        Raises RetryableError when all attempts failed, SampleError or RefusedError when this
-        request cannot succeed, UnavailableError when the model cannot answer at all,
-        BudgetReachedError when the call does not fit; a person HaltedError.
+        Raises RetryableError if all attempts failed, SampleError or RefusedError if this request
+        cannot succeed, UnavailableError if the model cannot answer at all, BudgetReachedError if
+        the call exceeds the cost limit, and HaltedError if a person ended the session.
 
-        Cancelled while it waits for its turn, it gives up at once. Cancelled while a request is
-        under way, which is paid for, it returns the answer; a second cancellation gives it up too.
+        When cancelled while it waits for its turn, it gives up at once. When cancelled during a
+        request, which is paid for, it returns the answer; a second cancellation gives it up too.
         """
 
     async def aclose(self) -> None:
@@ -128,16 +128,16 @@ class Model(Protocol):
 
 
 class Journal(Protocol):
-    """The record of calls before they are sent and when they have ended."""
+    """The journal of calls, written before they are sent and when they have ended."""
 
     def kept(self, key: str) -> Reply | None:
-        """Return the reply to a request that an earlier command was answered, or None."""
+        """Return the reply to a request of an earlier command, or None."""
 
     async def sent(self, model: str, sample: str, key: str, most_usd: float | None) -> Call:
         """Write a call that is about to be sent."""
 
     async def ended(self, call: Call, billed_usd: float | None, reply: Reply | None) -> None:
-        """Write what became of a call."""
+        """Write the end of a call."""
 
 
 class HaltedError(PhyblockError):
@@ -145,8 +145,8 @@ class HaltedError(PhyblockError):
 
 
 def wire_params(config: ModelConfig, request: Request) -> dict[str, Any]:
-    """Return what to send beside the messages: the request's sampling parameters, overridden by
-    the model's, and the format of the answer where the model takes one; None is not sent.
+    """Return the fields to send besides the messages: the request's sampling parameters,
+    overridden by the model's, and the answer format if the model accepts one; None is not sent.
     """
     merged = {**request.params, **config.params}
     if config.sends_format and request.response_format is not None:
@@ -157,7 +157,7 @@ def wire_params(config: ModelConfig, request: Request) -> dict[str, Any]:
 def json_body(
     fields: Mapping[str, Any], messages: tuple[Message, ...], detail: ImageDetail | None
 ) -> bytes:
-    """Return a request body: `messages` in place of that field, beside all others."""
+    """Return a request body of `fields` and `messages`."""
     pictures: list[bytes] = []
 
     def placeholder(image: Image) -> str:
@@ -174,9 +174,9 @@ def wire_messages(
     detail: ImageDetail | None,
     url_of: Callable[[Image], str] = attrgetter("data_uri"),
 ) -> list[dict[str, Any]]:
-    """Return chat messages, texts and pictures in the order given; a lone text is a plain string.
+    """Return chat messages, texts and pictures in the order given; a single text is a plain string.
 
-    `detail` is how closely pictures are looked at; None leaves it to the provider.
+    `detail` is the detail of pictures; None is the provider's default.
     """
 
     def part(part: str | Image) -> dict[str, Any]:
