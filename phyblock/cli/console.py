@@ -1,4 +1,4 @@
-"""Options, tables, paths and the question before money is spent, the same in all verbs."""
+"""Options, tables, paths and the confirmation of costs, shared by all commands."""
 
 from __future__ import annotations
 
@@ -31,25 +31,25 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 LINE_EVERY_S = 10.0
-"""Where no bar is shown, a line says so often how far work is."""
+"""Interval of progress lines where no bar is shown [s]."""
 INTERRUPTED = 130
 """The exit code after Ctrl-C."""
 _PIPE_WIDTH = 160
 _TEXT_WIDTH = 24
-"""Characters after which a cell of text may go on in a new line."""
+"""Characters after which a cell of text may wrap."""
 
 
 class _PlainConsole(Console):
-    """Shows strings as they are: no markup, no emoji codes, nothing that steers a terminal."""
+    """Shows strings literally: no markup, no emoji codes, no control characters."""
 
     def render_str(self, text: str, **options: Any) -> Text:
-        """Return the text, its control characters as spaces."""
+        """Return the text with spaces for control characters."""
         return super().render_str(plain_lines(text), **options)
 
 
 def make_console(*, stderr: bool = False) -> Console:
-    """Return the console; wide enough for whole tables when the output is no terminal."""
-    # Paths, names and what servers say may hold brackets and colons.
+    """Return the console, wide enough for whole tables if the output is not a terminal."""
+    # Paths, names and messages of servers may contain brackets and colons.
     console = _PlainConsole(stderr=stderr, highlight=False, markup=False, emoji=False)
     if not console.is_terminal and "COLUMNS" not in os.environ:
         console.width = _PIPE_WIDTH
@@ -66,9 +66,9 @@ def print_rows(
 
 
 def print_table(console: Console, view: TextTable) -> None:
-    """Print a table with its caption and notes; one that is too wide in several pieces.
+    """Print a table with its caption and notes, split into several pieces if it is too wide.
 
-    Every piece begins with the names of the rows; numbers are never cut or broken.
+    Every piece begins with the names of the rows; numbers are never cut or wrapped.
     """
     if view.caption:
         console.print(view.caption, style="bold")
@@ -91,7 +91,7 @@ def print_table(console: Console, view: TextTable) -> None:
 
 
 def _piece(view: TextTable, columns: Sequence[int], text_width: int | None = None) -> Table:
-    """Return some of the columns; the name of a group stands above the first of it."""
+    """Return some of the columns, with group names above the first of each group."""
     table = Table(box=box.SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, 1, 0, 0))
     group = ""
     for i in columns:
@@ -113,7 +113,7 @@ def _piece(view: TextTable, columns: Sequence[int], text_width: int | None = Non
 
 
 def tracked(items: Iterable[T], total: int | None, doing: str, noun: str = "scenes") -> Iterator[T]:
-    """Yield the items; show a progress bar on a terminal, a line now and then elsewhere."""
+    """Yield the items with a progress bar on a terminal, or occasional lines elsewhere."""
     console = make_console(stderr=True)
     columns = (TextColumn(doing), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     shown_s, hidden = time.monotonic(), not console.is_terminal
@@ -128,7 +128,7 @@ def tracked(items: Iterable[T], total: int | None, doing: str, noun: str = "scen
 
 
 def shown_path(path: Path) -> str:
-    """Return a path as a person would type it from here, on one line."""
+    """Return a path relative to the working folder if possible, on one line."""
     try:
         return one_line(str(path.resolve().relative_to(Path.cwd())))
     except (ValueError, OSError):
@@ -136,12 +136,12 @@ def shown_path(path: Path) -> str:
 
 
 def print_path(console: Console, path: Path | str) -> None:
-    """Print a path, or a command, on a line that is never broken, so that it can be copied."""
+    """Print a path or a command on a line that never wraps, so that it can be copied."""
     console.print(shown_path(path) if isinstance(path, Path) else path, soft_wrap=True)
 
 
 def print_again(console: Console, how: str = "give") -> None:
-    """Print that the same command goes on, and the command."""
+    """Print that the same command continues, and the command."""
     console.print(f"To go on, {how} the same command again:")
     print_path(console, f"  {shlex.join(['phyblock', *sys.argv[1:]])}")
 
@@ -149,10 +149,10 @@ def print_again(console: Console, how: str = "give") -> None:
 def may_spend(
     models: Sequence[str], show: Callable[[], None], *, has_limit: bool | None = None
 ) -> bool:
-    """True if a person agrees that calls to these models may cost money: the gate of all verbs.
+    """True if the user agrees that calls to these models may cost money; used by all commands.
 
-    `show` prints what the calls would take. Where nobody can answer, a cost limit is the answer
-    (None: the verb has no such limit); raises SpecError where there is none.
+    `show` prints the estimate. Without a terminal, a cost limit counts as agreement (None: the
+    command has no limit); raises SpecError if there is none.
     """
     is_asked = sys.stdin is not None and sys.stdin.isatty()
     if not models or (has_limit and not is_asked):
@@ -168,20 +168,20 @@ def may_spend(
 
 
 class UserPath(click.Path):
-    """A path with `~` for the home folder; an empty one, as from an unset variable, is refused."""
+    """A path with `~` for the home folder; an empty one, as from an unset variable, is an error."""
 
     def __init__(self, *, path_type: type[Any] = Path, **options: Any) -> None:
         super().__init__(path_type=path_type, **options)
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Return the path that `value` means."""
+        """Return the path of `value`."""
         if not os.fspath(value):
             self.fail("it is empty: is a variable not set?", param, ctx)
         return super().convert(os.path.expanduser(value), param, ctx)
 
 
 def _names(_: click.Context, __: click.Parameter, value: str | None) -> tuple[str, ...]:
-    """Return names that are separated by single commas."""
+    """Return the names in a comma-separated list."""
     names = () if value is None else tuple(name.strip() for name in value.split(","))
     if not all(names):
         raise click.BadParameter(f"{value!r} holds an empty name: {QUOTE_HINT}")
@@ -189,7 +189,7 @@ def _names(_: click.Context, __: click.Parameter, value: str | None) -> tuple[st
 
 
 def _shard(_: click.Context, __: click.Parameter, value: str | None) -> tuple[int, int] | None:
-    """Return a shard and the number of all, which 3/64 stands for."""
+    """Return the shard and the number of shards from a text such as 3/64."""
     if value is None:
         return None
     found = re.fullmatch(r"([1-9]\d{0,4})/([1-9]\d{0,4})", value)
@@ -226,7 +226,7 @@ _CLUSTER_OPTIONS = (
 
 
 def worker_options(jobs: int | None = None) -> Callable[[Any], Any]:
-    """Return a decorator that adds the options of a verb that works in parallel."""
+    """Return a decorator that adds the options of parallel commands."""
 
     def add(command: Any) -> Any:
         for option in reversed((jobs_option(jobs), *_CLUSTER_OPTIONS)):
@@ -237,19 +237,19 @@ def worker_options(jobs: int | None = None) -> Callable[[Any], Any]:
 
 
 def shards_folder(out: Path) -> Path:
-    """Return the folder that the shards of what goes to `out` share."""
+    """Return the folder that the shards of the output `out` share."""
     return out.with_name(f"{out.name}.shards")
 
 
 def open_shards(shard: tuple[int, int] | None, out: Path, work: str) -> Shards | None:
-    """Return the shard that was asked for, if any; StoreError in a folder of other work."""
+    """Return the requested shard, if any. Raises StoreError if the folder is of another job."""
     from phyblock.workers import Shards
 
     return None if shard is None else Shards(shards_folder(out), *shard, work)
 
 
 def left_to_first(shards: Shards | None, out: Path) -> bool:
-    """True, with a word of it, if another shard writes what was made."""
+    """True, with a message, if another shard writes the result."""
     if shards is None or shards.writes:
         return False
     click.echo(f"shard {shards.number}/{shards.count} is done; the first writes {shown_path(out)}")

@@ -1,4 +1,4 @@
-"""The `phyblock` command: its verbs, plugins, and how errors end it."""
+"""The `phyblock` command: subcommands, plugins, and exit codes of errors."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from phyblock.types import QUOTE_HINT
 _CLI, _MAKING, _MORE = "phyblock.cli", "phyblock.making.cli", "phyblock.integrations"
 _SECTIONS = {
     "Run": {
-        "init": (f"{_CLI}.setup:init", "Lay out a folder: a suite, models.yaml, prompts."),
+        "init": (f"{_CLI}.setup:init", "Create a folder: a suite, models.yaml, prompts."),
         "validate": (f"{_CLI}.setup:validate", "Check suites, models files and data sets."),
         "models": (f"{_CLI}.setup:models", "List models with prices and keys; check one."),
         "run": (f"{_CLI}.run:run", "Run a suite, or continue where it stopped."),
@@ -28,7 +28,7 @@ _SECTIONS = {
         "cache": (f"{_CLI}.setup:cache", "Show or clear the reply cache."),
     },
     "Look": {
-        "report": (f"{_CLI}.results:report", "Write tables and page again, or print the tables."),
+        "report": (f"{_CLI}.results:report", "Rebuild tables and page, or print the tables."),
         "show": (f"{_CLI}.results:show", "Show a sample: prompt, reply, verdict of each step."),
         "compare": (f"{_CLI}.results:compare", "Compare models on the same samples."),
         "figures": (f"{_CLI}.results:figures", "Draw figures for a paper, as PDF and SVG."),
@@ -37,22 +37,22 @@ _SECTIONS = {
         "export": (f"{_MORE}.cli:export", "Write a run, scenes or questions for other tools."),
         "bundle": (f"{_CLI}.results:bundle", "Write a run as one file that others can verify."),
         "verify": (f"{_CLI}.results:verify", "Score a bundle again and compare."),
-        "site": (f"{_CLI}.results:site", "Put runs and bundles into a leaderboard."),
+        "site": (f"{_CLI}.results:site", "Make a leaderboard of runs and bundles."),
     },
     "Data": {
         "scenes": (f"{_MAKING}.scenes:scenes", "Make, check, show and draw scenes."),
         "questions": (f"{_MAKING}.questions:questions", "Make, check and show questions."),
     },
 }
-"""Verbs by the heading that help lists them under: where each is (`module:name`), and its help."""
+"""Commands by the heading in the help: the place of each (`module:name`), and its help text."""
 _VERBS = {name: verb for verbs in _SECTIONS.values() for name, verb in verbs.items()}
 _ENTRY_POINTS = "phyblock.plugins"
 
 
 def _load_plugins(_: click.Context, __: click.Parameter, modules: tuple[str, ...]) -> None:
-    """Import plugins while the options of `phyblock` are read: before a command's own choices.
+    """Import plugins while the options of `phyblock` are parsed, before those of a command.
 
-    Raises SpecError that names the line in which one fails.
+    Raises SpecError naming the line in which one fails.
     """
     entries = entry_points(group=_ENTRY_POINTS)
     named = {entry.value.partition(":")[0]: f"plugin {entry.name}" for entry in entries}
@@ -71,7 +71,7 @@ def _load_plugins(_: click.Context, __: click.Parameter, modules: tuple[str, ...
 
 
 class _Verbs(click.Group):
-    """The verbs, whose names and help texts are known without importing any of them."""
+    """The commands, whose names and help texts are known without importing them."""
 
     def list_commands(self, _: click.Context) -> list[str]:
         return list(_VERBS)
@@ -115,12 +115,11 @@ def phyblock() -> None:
 
 def main() -> None:
     """Run the command line; exit code 2 for bad input, 1 for a failure, 130 for Ctrl-C."""
-    # What is made while modules load and data are read stays. Looking through it for garbage at
-    # Python's own intervals takes a tenth of a short command; at much longer ones, what calls to
-    # models leave behind piles up.
+    # Objects of modules and data stay. Garbage collection at Python's default intervals takes a
+    # tenth of a short command; at much longer ones, garbage of calls to models accumulates.
     gc.set_threshold(5_000, 10, 10)
     for stream in (sys.stdout, sys.stderr):
-        # A terminal that knows no plus-minus sign shall show a question mark, not fail.
+        # A terminal without a plus-minus sign must show a question mark, not fail.
         stream.reconfigure(errors="replace")  # type: ignore[union-attr]
     try:
         code = phyblock.main(prog_name="phyblock", standalone_mode=False)
@@ -145,7 +144,7 @@ def main() -> None:
         click.echo(plain_lines(f"error: {error}"), err=True)
         sys.exit(1)
     except BrokenPipeError:
-        # Who read the output has seen enough: `| head`.
+        # The reader of the output has closed it, as `| head` does.
         _drop_output()
         sys.exit(1)
     except OSError as error:
@@ -157,7 +156,7 @@ def main() -> None:
 
 
 def _set_hint(option: str) -> str:
-    """Return how to set the field of a suite that was taken for an option."""
+    """Return a hint on --set for an unknown option that is a field of a suite."""
     from phyblock.config.suite import suite_model
 
     name = option.lstrip("-").replace("-", "_")
@@ -168,14 +167,14 @@ def _set_hint(option: str) -> str:
 
 
 def _drop_output() -> None:
-    """Give up what standard output refuses to take, or the interpreter would try again."""
+    """Drop unwritten standard output, or the interpreter would try to write it again."""
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, sys.stdout.fileno())
     os.close(nowhere)
 
 
 def show_problems(error: InputError, most: int = 25) -> None:
-    """Print what is wrong, an entry a problem, the first ones of many."""
+    """Print the problems, at most `most` of them."""
     for problem in error.problems[:most]:
         click.secho("error: ", fg="red", bold=True, nl=False, err=True)
         click.echo(plain_lines(str(problem)), err=True)

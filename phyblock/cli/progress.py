@@ -1,4 +1,4 @@
-"""Progress of a run: a bar for each model in a terminal, a line now and then elsewhere."""
+"""Progress of a run: a bar for each model in a terminal, occasional lines elsewhere."""
 
 from __future__ import annotations
 
@@ -36,14 +36,14 @@ from phyblock.text import counted, one_line
 from phyblock.types import FAILURES
 
 _SHOWN_EVERY_S = 0.1
-"""Answers that come faster are shown together."""
+"""Minimum time between two updates of the display [s]."""
 _SPEED_OVER_S = 600.0
-"""Answers of so long decide how long the rest takes."""
+"""Period over which the speed is measured to estimate the remaining time [s]."""
 
 
 @dataclass
 class Tally:
-    """The sums of a model's records; `counts` are of the headline matcher and setting."""
+    """The sums over a model's records; `counts` are of the headline matcher and setting."""
 
     task: Task
     counts: Counts | None = None
@@ -80,9 +80,9 @@ class Tally:
 
 
 class ProgressView:
-    """Watches a run; use as a context manager and pass it as the run's watcher.
+    """Shows the progress of a run; use it as a context manager and as the run's watcher.
 
-    Notices, and repeated calls at most once in ten seconds for each model, are lines of their own.
+    Notices are printed as lines, and so are repeated calls, at most once in ten seconds per model.
     """
 
     def __init__(self, console: Console, now: Callable[[], float] = time.monotonic) -> None:
@@ -91,7 +91,7 @@ class ProgressView:
         self._tallies: dict[str, Tally] = {}
         self._started_s = self._last_line_s = now()
         self._has_asked = False
-        # Rich looks at the environment whenever it is asked.
+        # Rich reads the environment on every access.
         self._is_terminal = console.is_terminal
         self._shown_s = -math.inf
         self._progress = Progress(
@@ -116,7 +116,7 @@ class ProgressView:
         self._log_retries(math.inf)
 
     def __call__(self, event: RunEvent) -> None:
-        """Take note of an event."""
+        """Update the display for an event."""
         if isinstance(event, RunStarted):
             for name, expected in event.expected.items():
                 known = event.earlier[name]
@@ -138,12 +138,12 @@ class ProgressView:
             tally.last_retry = f"{event.message}; waiting {event.wait_s:.0f} s"
             self._has_asked = True
         elif isinstance(event, ModelEvent):
-            # As a batch that was sent, which has no calls under way.
+            # A batch that was sent has no calls in progress.
             self._has_asked = True
             self._print(f"{event.model}: {event.message}")
         elif isinstance(event, ModelStopped):
             task = self._tallies[event.model].task
-            # Samples that nobody will ask about are no part of the whole.
+            # Samples that will not be asked are not part of the total.
             self._progress.update(task.id, total=task.completed)
             self._print(f"{event.model} stopped: {event.reason}", style="red")
         elif isinstance(event, RunNotice | Stopping):
@@ -152,7 +152,7 @@ class ProgressView:
             self.tick()
 
     def tick(self, asks: bool = False) -> None:
-        """Print what is due; called several times a second. `asks`: calls are under way."""
+        """Print due lines; called several times a second. `asks`: calls are in progress."""
         self._shown_s = now_s = self._now()
         self._has_asked |= asks
         preparing = "" if self._has_asked else self._preparing(now_s)
@@ -165,14 +165,14 @@ class ProgressView:
 
     @property
     def cost_text(self) -> str:
-        """Return the cost of the run so far, as far as prices are known."""
+        """Return the cost of the run so far, if prices are known."""
         spent = sum(tally.cost_usd for tally in self._tallies.values())
         unknown = any(tally.unpriced for tally in self._tallies.values())
         return f"${spent:,.2f}" + (" and replies whose cost is not known" if unknown else "")
 
     @property
     def cached(self) -> int:
-        """Samples whose reply came from the cache."""
+        """Number of samples whose reply came from the cache."""
         return sum(tally.cached for tally in self._tallies.values())
 
     def _print(self, line: str, style: str = "") -> None:
@@ -181,7 +181,7 @@ class ProgressView:
             self._console.print(Text(one_line(line), style=style))
 
     def _log_retries(self, now_s: float) -> None:
-        """Log repeated calls: the first at once, then at most a line a model every ten seconds."""
+        """Log repeated calls: the first at once, then at most a line per model in ten seconds."""
         for model, tally in list(self._tallies.items()):
             more = tally.retries - tally.logged
             if more and now_s - tally.logged_s >= LINE_EVERY_S:
@@ -193,14 +193,14 @@ class ProgressView:
         return f"Preparing scenes ... ({_duration(now_s - self._started_s)})"
 
     def _line(self, now_s: float) -> str:
-        """Return the progress of the run in a line."""
+        """Return the progress of the run as a line."""
         if not self._has_asked:
             return self._preparing(now_s)
         tallies = list(self._tallies.values())
         done = sum(int(tally.task.completed) for tally in tallies)
         total = sum(int(tally.task.total or 0) for tally in tallies)
         text = f"{done:,} of {counted(total, 'sample')} after {_duration(now_s - self._started_s)}"
-        # The slowest model decides.
+        # The slowest model determines the remaining time.
         left_s = [tally.task.time_remaining for tally in tallies if not tally.task.finished]
         known_s = [seconds for seconds in left_s if seconds is not None]
         if known_s and len(known_s) == len(left_s):

@@ -1,4 +1,4 @@
-"""The verbs that read finished runs: report, show, compare, figures, bundle, verify and site.
+"""The commands that read finished runs: report, show, compare, figures, bundle, verify and site.
 
 Each imports what it needs when it is called.
 """
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 _MB = 1e6
 _STYLES = {"plain": "", "good": "green", "bad": "red"}
 _FAILURES = 4
-"""Messages of failed calls that are shown."""
+"""Maximum number of messages of failed calls that are shown."""
 
 
 @click.command()
@@ -53,8 +53,8 @@ def report(
 ) -> None:
     """Write tables and report.html of the folder RUN again; with --print, print its tables.
 
-    Uses only the files of the run: no model, no network. Draws scenes from the data set,
-    where it is at hand.
+    Uses only the files of the run: no model, no network. Draws scenes if the data set is
+    available.
     """
     console = make_console()
     if not prints:
@@ -74,7 +74,7 @@ def report(
         tables = make_tables(loaded, names or table_names(loaded))
     if not tables:
         is_other = loaded.design.suite.dataset.format != "official"
-        others = "The paper's tables are of the official scenes; this run is of others."
+        others = "The paper's tables are about the official scenes; this run used others."
         console.print(
             others if is_other else "No model of the run has a row in the paper's tables."
         )
@@ -103,8 +103,8 @@ def show_tables(
 ) -> Path:
     """Write the tables and the page of a run folder; with `kept`, only if they are out of date.
 
-    Prints the summary, and keeps it in the folder with `keep`, for a run that is complete. Returns
-    the page, or the folder of tables where no page is wanted.
+    Prints the summary and, with `keep` and for a complete run, stores it in the folder. Returns the
+    path of the page, or of the folder of tables without a page.
     """
     wanted = REPORT_FILE if page else TABLES
     if kept and (summary := kept_summary(folder, wanted)) is not None:
@@ -154,10 +154,9 @@ def _print_summary(summary: Summary) -> None:
 )
 @data_option
 def show(run: Path, sample: str, gif: Path | None, size: int, data: Path | None) -> None:
-    """Show SAMPLE of the folder RUN: prompt, reply, what was parsed, and the verdict of each step.
+    """Show SAMPLE of the folder RUN: prompt, reply, parsed answer, and the verdict of each step.
 
-    SAMPLE is as in records.jsonl (TRACK/MODEL/ITEM/sSEED); a part that only one sample has is
-    enough.
+    SAMPLE is an id as in records.jsonl (TRACK/MODEL/ITEM/sSEED), or any unique part of it.
     """
     from phyblock.files import write_named
     from phyblock.records.files import read_manifest
@@ -222,7 +221,7 @@ def show(run: Path, sample: str, gif: Path | None, size: int, data: Path | None)
 
 
 def _find(run: Path, sample: str) -> Record:
-    """Return the newest record that `sample` means; StoreError where not one is meant."""
+    """Return the newest record of `sample`. Raises StoreError unless exactly one matches."""
     from phyblock.records.files import RECORDS, newest_starts, run_records
 
     lines = run_records(run)
@@ -237,7 +236,7 @@ def _find(run: Path, sample: str) -> Record:
 
 
 def _print_prompt(console: Console, run: Path, record: Record) -> None:
-    """Print what was sent, of an episode with the first turn; pictures by label and size."""
+    """Print the prompt (of an episode the first), with labels and sizes of pictures."""
     from phyblock.records.files import PromptLines
 
     if record.prompt is None:
@@ -270,7 +269,7 @@ def compare(
 
     Pairs samples of the same scene or question and seed, and tests them by a t test that accounts
     for scenes that share base scenes. Shows p values with Holm's correction, and the difference
-    that each test could have found.
+    that each test could have detected.
     """
     from phyblock.results.compare import (
         compare_models,
@@ -321,8 +320,7 @@ def figures(
     """Draw figures of the folder RUN for a paper: PDF and SVG with real text, PNG for slides, and
     captions as plain text and LaTeX floats.
 
-    Draws all figures, unless you name some with --only. Leaves out figures that the run has no
-    numbers for.
+    Draws all figures that the run has numbers for, or those named with --only.
     """
     from phyblock.results.figures import Look, figures_of, write_paper_figures
     from phyblock.results.load import load_run, of_models
@@ -343,8 +341,8 @@ def figures(
 def bundle(run: Path, out: Path | None) -> None:
     """Write the folder RUN as one file: manifest, records, digests.
 
-    Leaves out keys, pictures, prompts, addresses of servers, and all but the last part of paths of
-    this machine. Keeps replies and sampling parameters. `phyblock verify` scores it again.
+    Contains replies and sampling parameters, but no keys, pictures, prompts or server addresses,
+    and only the last part of local paths. `phyblock verify` scores it again.
     """
     from phyblock.bundle import bundle_run
 
@@ -358,12 +356,10 @@ def bundle(run: Path, out: Path | None) -> None:
 @click.argument("file", type=UserPath())
 @data_folders_option
 def verify(file: Path, data: tuple[Path, ...]) -> None:
-    """Score the replies in the bundle FILE again, and report whether its records come out as the
-    same bytes, what was not verified, and whether samples are missing. Exits with 2 if the records
-    differ.
+    """Score the replies in the bundle FILE again, and report if its records are the same bytes,
+    what was not verified, and if samples are missing. Exits with 2 if the records differ.
 
-    Calls no model. A bundle holds no data: sets that come with phyblock are found; name others
-    with --data.
+    Calls no model. A bundle contains no data set: bundled sets are found; name others with --data.
     """
     from phyblock.bundle import opened_bundle
 
@@ -388,11 +384,11 @@ def verify(file: Path, data: tuple[Path, ...]) -> None:
 @data_folders_option
 @click.option("--title", default="PhyBlock leaderboard", help="Its heading.")
 def site(runs: tuple[Path, ...], out: Path, data: tuple[Path, ...], title: str) -> None:
-    """Put RUNS (run folders and bundles) into one static folder: ranks, a page for every model
+    """Write RUNS (run folders and bundles) as one static folder: ranks, a page for every model
     and scene, and every sample step by step.
 
-    The folder opens from disk or from any web server. Runs must be of one data version and prompt.
-    Bundles are scored again first, and those that do not verify are refused.
+    The folder opens from disk or from any web server. Runs must use one version of the data and one
+    prompt. Bundles are scored again first, and those that do not verify are refused.
     """
     from phyblock.web.leaderboard import write_site
 

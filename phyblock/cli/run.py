@@ -1,4 +1,4 @@
-"""`phyblock run`, `play` and `score`: ask models or a person, score stored replies again."""
+"""`phyblock run`, `play` and `score`: ask models or a person, rescore stored replies."""
 
 from __future__ import annotations
 
@@ -94,8 +94,8 @@ def run(
 ) -> int:
     """Run SUITE: a YAML file, or the name of a bundled suite.
 
-    Keeps every record as it comes. Give the same command again to continue where it stopped; no
-    call is repeated.
+    Writes every record as soon as it is complete. Run the same command again to continue where it
+    stopped; no call is repeated.
     """
     console = make_console()
     loaded = read_suite(suite, sets)
@@ -104,7 +104,7 @@ def run(
     folder = out or plan.folder_in(Path("results"))
     wanted = TABLES if no_report else REPORT_FILE
     held = held_run(folder, plan.manifest)
-    # Nothing is left to ask, and what was made stays.
+    # Nothing is left to ask, and existing outputs stay.
     is_as_it_was = (
         held is not None
         and not retry_failed
@@ -135,8 +135,8 @@ def run(
         from phyblock.models.litellm_client import be_quiet
 
         be_quiet()
-    # Suite, scenes and modules stay to the end: looking through them for garbage again and again
-    # takes a tenth of a run. So do records, while tables are made of them.
+    # Suite, scenes and modules stay to the end: collecting garbage among them repeatedly takes a
+    # tenth of a run. So do records, while tables are made from them.
     gc.freeze()
     with ProgressView(console) as view:
         session = Session(plan, folder, view, **asks)
@@ -149,7 +149,7 @@ def run(
 
 
 def _conclude(console: Console, folder: Path, result: RunResult, view: ProgressView) -> int:
-    """Print how a run ended, its cost and how to continue; return the exit code."""
+    """Print the result of a run, its cost and how to continue; return the exit code."""
     for remark in remarks_on(result, shown_path(folder)):
         console.print(one_line(remark), style="red")
     done = f"All {result.samples:,} samples are done"
@@ -169,7 +169,7 @@ def _conclude(console: Console, folder: Path, result: RunResult, view: ProgressV
 
 
 def print_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) -> None:
-    """Print the calls, tokens and cost of each model, and their sums."""
+    """Print the calls, tokens and cost of each model, and the sums."""
     items = [counted(len(track.items), kind_of(track.name).item) for track in plan.tracks]
     facts = [f"{', '.join(items)} of {plan.dataset.name}", counted(len(plan.suite.seeds), "seed")]
     if len(plan.variants) > 1:
@@ -251,7 +251,7 @@ def play(
 ) -> int:
     """Answer SUITE yourself, in a browser: the pictures that models get, and clicks for answers.
 
-    Answers are records of the model human:NAME in a run folder. Give the same command again to
+    Answers are records of the model human:NAME in a run folder. Run the same command again to
     continue where it stopped.
     """
     import webbrowser
@@ -276,7 +276,7 @@ def play(
         print_path(console, f"Open {server.address}")
         console.print("Ctrl-C ends the session; the same command continues it.", style="dim")
         if not no_browser:
-            # A browser for terminals would not come back before it is closed.
+            # A terminal browser would block until it is closed.
             Thread(target=webbrowser.open, args=(server.one_time_address,), daemon=True).start()
 
     session = PlaySession(plan.samples_per_model)
@@ -307,10 +307,9 @@ def score(
     ray_address: str | None,
     shard: tuple[int, int] | None,
 ) -> None:
-    """Read and score the stored replies of the folder RUN again, and count every measure again.
-    Calls no model.
+    """Parse and score the stored replies of the folder RUN again. Calls no model.
 
-    The new scores replace the records of RUN in one step.
+    The new records replace those of RUN in one step.
     """
     from phyblock.run.rescore import rescore
 

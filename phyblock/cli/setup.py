@@ -1,4 +1,4 @@
-"""`phyblock init`, `validate`, `models` and `cache`: a working folder, its files, paid replies."""
+"""`phyblock init`, `validate`, `models` and `cache`: a working folder, its files, the cache."""
 
 from __future__ import annotations
 
@@ -68,9 +68,9 @@ _FILES = (
     help="Bundled suite to begin with.",
 )
 def init(folder: Path, suite: str) -> None:
-    """Lay out FOLDER with a suite, a models file and prompts to change.
+    """Create FOLDER with a suite, a models file and prompts to edit.
 
-    Never writes over files that are already there.
+    Never overwrites existing files.
     """
     tracks = read_yaml(find_suite(suite)).data.get("tracks", ["full_planning"])
     templates = [kind_of(name).template for name in tracks]
@@ -124,7 +124,7 @@ def validate(files: tuple[Path, ...], sets: tuple[str, ...], models_file: str | 
 
 
 def _check(path: Path, sets: tuple[str, ...], models_file: str | None) -> list[str]:
-    """Describe a file without problems, and add remarks."""
+    """Return a description of a valid file, and remarks."""
     if os.path.isdir(path) or path.name == SCENES_FILE:
         dataset = read_data_set(str(path))
         levels = sorted({n for task in dataset.tasks for n in task.scene.levels})
@@ -239,7 +239,7 @@ def check(known: Mapping[str, ModelConfig], name: str, yes: bool) -> int:
 async def _ask_tiny(config: ModelConfig) -> str:
     """Show the model a small red square and ask for its color; one attempt, nothing cached.
 
-    Raises the ModelError that the call met, SpecError or DataError when the model cannot be built.
+    Raises the ModelError of the call, or SpecError or DataError if the model cannot be built.
     """
     from PIL import Image as PillowImage
 

@@ -42,22 +42,22 @@ from phyblock.types import BATCH_PROVIDERS, ImageDetail, SendMode, TransportName
 Kind = Literal["litellm", "replay", "baseline", "human"]
 
 RECORDED = "recorded"
-"""The word that stands for every folder of recorded replies."""
+"""The word for every folder of recorded replies."""
 GROUP = "group:"
-"""The prefix of a group's name where models are named."""
+"""The prefix of a group's name in lists of models."""
 HUMAN = "human:"
-"""The prefix of a person's name where models are named."""
+"""The prefix of a person's name in lists of models."""
 DIRECT_PROVIDERS = ("openai", "hosted_vllm", "lm_studio")
-"""Provider prefixes that mean the plain OpenAI protocol: litellm has nothing to translate."""
+"""Provider prefixes of the plain OpenAI protocol, for which litellm has nothing to translate."""
 OWN_SERVER = "a server of one's own"
-"""Stands for an address where it decides nothing but that it is no provider's."""
+"""Placeholder in identities for the address of any server that is not the provider's."""
 ADDRESS_ALLOWED = "http://... or https://..., without user, password, query and fragment"
 
 _SELF_HOSTED = (
     "hosted_vllm", "lm_studio", "llamafile", "custom_openai", "xinference", "litellm_proxy",
 )  # fmt: skip
-"""Providers that are nowhere unless `api_base`, or the variable PROVIDER_API_BASE, says where:
-litellm sends their prompts to api.openai.com otherwise, but for llamafile's."""
+"""Providers that need an address, from `api_base` or the variable PROVIDER_API_BASE: otherwise
+litellm sends their prompts to api.openai.com, except llamafile's."""
 _RENAMES_PARAMETERS = re.compile(r"o\d|gpt-5")
 _OWNERS = (("gpt", "openai"), ("o1", "openai"), ("o3", "openai"), ("claude", "anthropic"),
            ("gemini", "gemini"), ("qwen-vl", "dashscope"))  # fmt: skip
@@ -68,18 +68,18 @@ _DETAILS: Mapping[str, tuple[str, ...]] = {
     "gemini": ("low", "medium", "high", "ultra_high"),
     "anthropic": (),
 }
-"""Values of `image_detail` by provider; of all others nothing is known."""
+"""Values of `image_detail` by provider; those of all others are unknown."""
 _OWN_BODY = (
     "model", "messages", "n", "best_of", "stream", "max_tokens", "max_completion_tokens",
 )  # fmt: skip
-"""Fields of a request's body that phyblock writes, or that multiply what is billed."""
+"""Fields of a request's body that phyblock writes, or that multiply the cost."""
 
 
 def is_address(url: str) -> bool:
-    """True if a model can be called at this address, which holds no user, query or fragment.
+    """True if a model can be called at this address, which has no user, query or fragment.
 
-    An address stands in run folders, in the reply cache and in messages. So it may hold nothing
-    that is worth hiding, and what is refused is not shown.
+    Addresses are stored in run folders and the reply cache and shown in messages. So they must not
+    contain secrets, and a refused one is not shown.
     """
     if len(url) > 1000 or not url.isprintable() or set(url) & set("?#\\"):
         return False
@@ -99,7 +99,7 @@ def is_address(url: str) -> bool:
 
 
 def host_of(url: str) -> str:
-    """Return host and port alone; "an unreadable address" where there are none."""
+    """Return only host and port, or "an unreadable address"."""
     try:
         parts = urllib.parse.urlsplit(url)
         host, port = parts.hostname, parts.port
@@ -132,10 +132,10 @@ class Price(Section):
     output: Cost
     """Reply tokens [USD per million]."""
     cached: Cost | None = None
-    """Prompt tokens that the provider has in its cache [USD per million]; null: the price of
+    """Prompt tokens that the provider reads from its cache [USD per million]; null: the price of
     input."""
     cache_write: Cost | None = None
-    """Prompt tokens that the provider puts into its cache [USD per million]; null: the price of
+    """Prompt tokens that the provider writes to its cache [USD per million]; null: the price of
     input."""
 
 
@@ -155,10 +155,10 @@ class Tier(Rate):
 
 
 class Tariff(Rate):
-    """The price of a model, where litellm's price map does not know it or is wrong."""
+    """The price of a model, if litellm's price map does not have it or is wrong."""
 
     tiers: Annotated[tuple[Tier, ...], checked(_rising)] = ()
-    """Other prices of calls with long prompts, by rising `above`."""
+    """Other prices for calls with long prompts, in ascending order of `above`."""
 
 
 def _id_faults(model_id: str) -> Iterator[Fault]:
@@ -201,15 +201,15 @@ class SamplingSpec(Section):
     top_p: TopP | None = None
     """Above 0, at most 1; null: not sent."""
     max_tokens: Count | None = 4096
-    """Limit of a reply, thinking included [tokens]; null: not sent."""
+    """Limit of a reply, including thinking [tokens]; null: not sent."""
 
 
 class ModelConfig(Section):
-    """One model: where it is and how it is asked.
+    """One model: its address and parameters.
 
-    Exactly one of `id` and `replay` is given; a built-in baseline and a person have a name alone.
-    A field that is left out takes the suite's value (`with_defaults`); a sampling parameter that is
-    null is not sent.
+    Exactly one of `id` and `replay` is given; a built-in baseline and a person have only a name. A
+    missing field takes the suite's value (`with_defaults`); a sampling parameter that is null is
+    not sent.
     """
 
     model_config = ConfigDict(
@@ -224,71 +224,71 @@ class ModelConfig(Section):
         BeforeValidator(_one_or_list, json_schema_input_type=_Address | list[_Address] | None),
     ] = Field(default=(), alias="api_base")
     """Address of an OpenAI-compatible server (vLLM, Ollama, LM Studio), such as
-    http://localhost:8000/v1; a list where several serve the same model. Each request goes to the
-    one with the fewest under way; one that cannot be reached rests and is tried again."""
+    http://localhost:8000/v1; a list if several serve the same model. Each request goes to the one
+    with the fewest in progress; one that cannot be reached is set aside and tried again."""
     revision: Annotated[str, Field(min_length=1, max_length=100)] | None = None
-    """Name of the weights, where the id does not tell. Two servers with the same id count as the
-    same model, unless their revisions differ."""
+    """Name of the weights, if the id does not identify them. Two servers with the same id count as
+    the same model, unless their revisions differ."""
     api_key_env: _Variable | None = None
-    """Name of the environment variable that holds the key, where it is not the provider's usual
-    one. Never the key itself."""
+    """Name of the environment variable that holds the key, if it is not the provider's usual one.
+    Never the key itself."""
     transport: TransportName = "auto"
-    """litellm: through the library. direct: straight HTTP, for servers that speak the OpenAI chat
-    protocol. auto: direct where it can."""
+    """litellm: through the library. direct: plain HTTP, for servers that speak the OpenAI chat
+    protocol. auto: direct if possible."""
     batch: Flag = False
     """Send requests in the provider's batches (OpenAI and servers with its /files and /batches,
-    Anthropic, Gemini): slower, by up to a day, and cheaper. A run does not depend on it: it may
-    change before the run is continued."""
+    Anthropic, Gemini): slower, by up to a day, and cheaper. It is not part of a run's identity and
+    may change before the run is continued."""
     max_concurrency: Count = 64
-    """Calls to this model under way at once. Left out: the suite's."""
+    """Maximum number of concurrent calls to this model. If missing: the suite's."""
     rpm: Count | None = None
-    """Most requests a minute."""
+    """Maximum requests per minute."""
     tpm: Count | None = None
-    """Most tokens a minute."""
+    """Maximum tokens per minute."""
     temperature: Temperature | None = None
-    """0 to 2. Left out: the suite's; null: not sent."""
+    """0 to 2. If missing: the suite's; null: not sent."""
     top_p: TopP | None = None
-    """Above 0, at most 1. Left out: the suite's; null: not sent."""
+    """Above 0, at most 1. If missing: the suite's; null: not sent."""
     max_tokens: Count | None = None
-    """Limit of a reply [tokens]. Left out: the suite's; null: not sent."""
+    """Limit of a reply [tokens]. If missing: the suite's; null: not sent."""
     reasoning_effort: Literal["none", "minimal", "low", "medium", "high", "xhigh", "max"] | None = (
         None
     )
     """Effort of a reasoning model; null: not sent."""
     image_detail: ImageDetail | None = None
-    """Detail in which pictures are seen: the `detail` of OpenAI and compatible servers (auto, low,
-    high, original), the media resolution of Gemini (low, medium, high, ultra_high); null: the
-    provider's default."""
+    """Detail of pictures: the `detail` of OpenAI and compatible servers (auto, low, high,
+    original), the media resolution of Gemini (low, medium, high, ultra_high); null: the provider's
+    default."""
     extra_body: Annotated[dict[str, JsonValue], checked(_body_faults)] = Field(default_factory=dict)
-    """Further fields of the request body, sent as they are; not model, messages, n, best_of,
-    stream, max_tokens, max_completion_tokens."""
+    """Further fields of the request body, sent unchanged; not model, messages, n, best_of, stream,
+    max_tokens, max_completion_tokens."""
     price: Tariff | None = None
-    """Price; null: that of litellm's price map, or unknown."""
+    """Price; null: that of litellm's price map, else unknown."""
     max_cost_usd: Cost | None = None
-    """The model is stopped before it costs more than this in a run [USD]; null: only the run's
-    limit."""
+    """The model is stopped before it costs more than this in a run [USD]; null: only the limit of
+    the run applies."""
     seed: SendMode = "auto"
-    """auto: seeds are sent where litellm knows the provider to take them, and to OpenAI-compatible
-    servers named by api_base. always, never: sent, or not, whatever is known. Without seeds,
-    repeats are independent."""
+    """auto: seeds are sent if litellm knows that the provider accepts them, and to
+    OpenAI-compatible servers named by api_base. always, never: sent, or not, in any case. Without
+    seeds, repeats are independent."""
     response_format: SendMode = "auto"
-    """With answer_format: json_schema in the suite. auto: the schema is sent where litellm knows
-    the model to take one, and to OpenAI-compatible servers named by api_base. always, never: sent,
-    or not, whatever is known. The prompt always states the form."""
+    """With answer_format: json_schema in the suite. auto: the schema is sent if litellm knows that
+    the model accepts one, and to OpenAI-compatible servers named by api_base. always, never: sent,
+    or not, in any case. The prompt always describes the format."""
     timeout_s: TimeoutS = 300.0
-    """Longest wait for a whole reply [s]. Left out: the suite's."""
+    """Maximum wait for a whole reply [s]. If missing: the suite's."""
     published: Text | None = None
     """Name of its row in the paper's tables."""
     size_b: TimeoutS | None = None
-    """Parameters [billions], where known."""
+    """Parameters [billions], if known."""
     groups: Unique[_Group] = ()
-    """Its groups: group:NAME in a suite or after --models stands for all models of a group, in the
-    order of this file."""
+    """Its groups: group:NAME in a suite or in --models means all models of a group, in the order of
+    this file."""
     replay: Text | None = None
     """Folder of recorded replies to use instead of an id, relative to this file."""
 
     def faults(self) -> Iterator[Fault]:
-        """Yield fields that others, or the provider, leave no room for."""
+        """Yield fields that conflict with others or with the provider."""
         provider, known = self.provider, _DETAILS.get(self.provider)
         if self.replay is not None:
             with_replay = ("groups", "published", "replay", "size_b")
@@ -301,7 +301,7 @@ class ModelConfig(Section):
             message = f"needs api_base, the address of the server that speaks for {provider}"
             yield Fault(message, at=("transport",))
         if self.image_detail is not None and known is not None and self.image_detail not in known:
-            # It would be ignored, or refused with every request.
+            # It would be ignored, or refused in every request.
             allowed = ", ".join(known) or "none"
             yield Fault(f"is not known to {provider}", allowed, at=("image_detail",))
         if self.batch and provider not in BATCH_PROVIDERS:
@@ -315,7 +315,7 @@ class ModelConfig(Section):
 
     @property
     def kind(self) -> Kind:
-        """The kind of answers: over the network, from a recording, by a rule, or by hand."""
+        """The kind of model: network, recording, baseline, or person."""
         if self.replay is not None:
             return "replay"
         if self.id:
@@ -329,29 +329,29 @@ class ModelConfig(Section):
 
     @property
     def provider(self) -> str:
-        """The part of the id before the first slash, "" when there is none."""
+        """The part of the id before the first slash, or ""."""
         return self.id.partition("/")[0] if "/" in self.id else ""
 
     @property
     def provider_model(self) -> str:
-        """The id without the provider: the model's name as the provider knows it."""
+        """The id without the provider: the provider's name for the model."""
         return self.id.partition("/")[2] if "/" in self.id else self.id
 
     @property
     def api_base(self) -> str | None:
-        """The address where there is one alone."""
+        """The address, if there is exactly one."""
         return self.addresses[0] if len(self.addresses) == 1 else None
 
     def at(self, address: str | None) -> Self:
-        """Return the model as one server serves it; None is its provider's."""
+        """Return the model at one server's address; None is its provider's."""
         return self.model_copy(update={"addresses": () if address is None else (address,)})
 
     @property
     def is_direct(self) -> bool:
         """True if calls go straight to the server instead of through litellm.
 
-        With `auto`: an OpenAI-compatible server that is named by `api_base`, unless the model is
-        one of those for which litellm renames parameters.
+        With `auto`, these are calls to an OpenAI-compatible server named by `api_base`, unless
+        litellm renames parameters for the model.
         """
         if self.transport != "auto":
             return self.transport == "direct"
@@ -363,7 +363,7 @@ class ModelConfig(Section):
 
     @property
     def sends_format(self) -> bool:
-        """True if a request's `response_format` is sent; else the prompt alone says the form."""
+        """True if `response_format` is sent; else only the prompt describes the format."""
         return self.response_format == "always"
 
     @property
@@ -374,14 +374,14 @@ class ModelConfig(Section):
         return {**params, "extra_body": self.extra_body} if self.extra_body else params
 
     def with_defaults(self, values: Mapping[str, Any]) -> Self:
-        """Return the model with values for those fields that its entry leaves out."""
+        """Return the model with values for the fields that its entry does not set."""
         missing = {name: v for name, v in values.items() if name not in self.model_fields_set}
         return self.model_copy(update=missing)
 
     def identity(self) -> dict[str, object]:
-        """Return what changes replies, JSON-able: not the limits, the price, the transport, nor at
-        which address a custom server is. That it is no provider's does count, or the replies of a
-        stand-in would pass for the provider's. Fields that a model does not set are left out.
+        """Return everything that affects replies, as JSON data: not limits, price, transport or the
+        address of a custom server. It does record that the server is custom, or the replies of a
+        stand-in could pass for the provider's. Fields that are not set are omitted.
         """
         identity: dict[str, object] = {
             "kind": self.kind,
@@ -433,7 +433,7 @@ _Entry = Annotated[
 
 
 class ModelsFile(RootModel[dict[Annotated[ModelName, checked(_name_faults)], _Entry]]):
-    """Models by the name that suites use."""
+    """Models by the names used in suites."""
 
     model_config = ConfigDict(json_schema_extra={"additionalProperties": False})
 
@@ -441,7 +441,7 @@ class ModelsFile(RootModel[dict[Annotated[ModelName, checked(_name_faults)], _En
 def load_models(path: Path) -> dict[str, ModelConfig]:
     """Read a models file: each name maps to a litellm id or to a mapping.
 
-    Paths of replay folders come out absolute. Raises SpecError with all that is wrong.
+    Paths of replay folders become absolute. Raises SpecError with all problems.
     """
     source = read_yaml(path)
     source.data = {} if source.data is None else source.data
@@ -461,12 +461,12 @@ def load_models(path: Path) -> dict[str, ModelConfig]:
 
 
 def group_names(known: Mapping[str, ModelConfig]) -> tuple[str, ...]:
-    """Return the groups that models belong to, in the order in which the file names them."""
+    """Return the groups of models, in the order of the file."""
     return tuple(dict.fromkeys(group for config in known.values() for group in config.groups))
 
 
 def with_members(names: Sequence[str], known: Mapping[str, ModelConfig]) -> tuple[str, ...]:
-    """Return the names with the members of a group in its place; an unknown group stays."""
+    """Return the names, with groups replaced by their members; unknown groups are kept."""
     members: dict[str, None] = {}
     for name in names:
         group = name.removeprefix(GROUP) if name.startswith(GROUP) else None
@@ -478,10 +478,10 @@ def with_members(names: Sequence[str], known: Mapping[str, ModelConfig]) -> tupl
 def resolve_models(
     names: Sequence[str], known: Mapping[str, ModelConfig], where: Callable[[int], str]
 ) -> dict[str, ModelConfig]:
-    """Return the models of these names in their order, those of a group in its place.
+    """Return the models of these names in their order, with groups replaced by their members.
 
-    Raises SpecError for each name that is neither a model, a group nor a built-in baseline, at the
-    place of its index.
+    Raises SpecError for each name that is not a model, a group or a built-in baseline, at its place
+    in the list.
     """
     named = {**{name: ModelConfig(name=name) for name in baseline_names()}, **known}
     allowed = [*named, *(GROUP + name for name in group_names(known))]

@@ -1,6 +1,6 @@
-"""Suites: which models are asked about which scenes, how, and what is made of the replies.
+"""Suites: models, scenes, presentation and scoring of runs.
 
-The descriptions below become the JSON Schema's, which an editor shows beside each key.
+The descriptions below become those of the JSON Schema, which editors show beside each key.
 """
 
 from __future__ import annotations
@@ -61,10 +61,10 @@ SectionT = TypeVar("SectionT", bound=BaseModel)
 LevelT = TypeVar("LevelT")
 
 BUILTIN_DATASET = "phyblock-400"
-"""The bundled data set that is used when a suite names none."""
+"""The data set of suites that name none."""
 PROMPT_WORDS = ("default", "official")
 REPEAT = "repeats"
-"""The factor that changes nothing that is sent: its levels ask the same again."""
+"""The factor that changes nothing in requests: its levels repeat them."""
 FACTORS: Mapping[str, tuple[str, ...] | None] = {
     "prompt": None,
     "background": ("images", "background"),
@@ -73,8 +73,8 @@ FACTORS: Mapping[str, tuple[str, ...] | None] = {
     "layout": ("images", "layout"),
     REPEAT: None,
 }
-"""Factors of `vary` with the path of the field that each gives values to; every track names its
-prompt in a field of its own."""
+"""Factors of `vary` with the path of the field that each sets; the prompt is in a field of each
+track."""
 
 Prompt = Literal["default", "official"] | Template
 Seed = Annotated[int, Field(strict=True, ge=0, le=2**31 - 1)]
@@ -91,23 +91,23 @@ Range = Annotated[tuple[float, float], checked(_falling)]
 
 
 class DifficultySpec(Section):
-    """Ranges of measured numbers, [least, most], that scenes have to be within; null: any."""
+    """Ranges of difficulty measures, [least, most], that select scenes; null: any."""
 
     blocks: Range | None = None
     """Number of blocks."""
     depth: Range | None = None
     """Layers: the longest path of dependencies."""
     orders: Range | None = None
-    """Decimal logarithm of how many orders the blocks can be placed in, at the least."""
+    """Decimal logarithm of a lower bound on the number of valid orders."""
     blind: Range | None = None
     """F1 in setting A, 0 to 1, of naming every candidate once."""
     distractor: Range | None = None
-    """In how many of type, color and orientation the nearest distractor differs from what is
-    needed, on average: 1 to 3."""
+    """In how many of type, color and orientation the nearest distractor differs from a needed
+    block, on average: 1 to 3."""
 
     @property
     def ranges(self) -> dict[str, tuple[float, float]]:
-        """The ranges that are asked for."""
+        """The ranges that are set."""
         found = {name: getattr(self, name) for name in type(self).model_fields}
         return {name: ends for name, ends in found.items() if ends is not None}
 
@@ -119,12 +119,12 @@ class DatasetSpec(Section):
     """builtin: the project's own format. official: a checkout of the official PhyBlock
     repository."""
     path: Text | None = None
-    """builtin: the name of a bundled data set (phyblock-400 when left out) or a folder that holds
+    """builtin: the name of a bundled data set (default: phyblock-400) or a folder that holds
     scenes.jsonl (write ./name for a folder beside the suite). official: the checkout's folder.
-    Relative to the suite file, or to the working directory when given by --set; ~ and $VARIABLES
-    are expanded."""
+    Relative to the suite file, or to the working directory if given by --set; ~ and $VARIABLES are
+    expanded."""
     difficulty: DifficultySpec = DifficultySpec()
-    """Ranges of measured numbers that scenes have to be within."""
+    """Ranges of difficulty measures that select scenes."""
 
 
 class ImagesSpec(Section):
@@ -145,16 +145,16 @@ class ImagesSpec(Section):
     view: View = "oblique"
     """View of rendered scenes and candidates; questions have their own views."""
     background: BackgroundName | None = None
-    """Background of all rendered pictures, one of the paper's six. null: for questions the one that
-    each names, else the checkerboard, which is dark."""
+    """Background of all rendered pictures, one of the paper's six. null: each question's own, else
+    the dark checkerboard."""
 
 
 class CandidatesSpec(Section):
     """The presentation of candidates."""
 
     order: CandidateOrder = "file"
-    """file: numbered as in the data. shuffled: each seed draws another order for every scene, the
-    same for all models; numbers in pictures, prompts and replies follow it."""
+    """file: numbered as in the data. shuffled: each seed gives every scene another random order,
+    the same for all models; numbers in pictures, prompts and replies follow it."""
 
 
 class ScoringSpec(Section):
@@ -167,39 +167,38 @@ class ScoringSpec(Section):
     """Criterion of Level 1. selection: one-to-one, order ignored. membership: the criterion of the
     paper's Level-1 columns. aov: as at the other levels."""
     missing: MissingPolicy = "count"
-    """Missing replies. count: their blocks count as not placed. skip: the scene is left out, as in
+    """Missing replies. count: their blocks count as not placed. skip: the scene is excluded, as in
     the paper."""
 
 
 class LimitsSpec(Section):
-    """Bounds of a run; they change how fast results come, not what they are."""
+    """Limits of a run, which change its speed and not its results."""
 
     max_concurrency: Count = 64
-    """Calls under way at once, over all models."""
+    """Maximum number of concurrent calls, over all models."""
     max_attempts: Count = 8
     """Number of failed requests after which a sample is given up. Until retry_for_s is over, more
-    are sent, except after answers that were paid for and cannot be read."""
+    are sent, except after paid answers that cannot be read."""
     retry_for_s: Annotated[float, Field(strict=True, ge=0)] = 300.0
-    """Longest outage that a run waits out [s]: a sample is given up no sooner after its first
+    """Longest outage that a run waits out [s]: a sample is not given up sooner after its first
     failure, and a model whose server cannot be reached for longer is stopped."""
     max_connection_failures: Count = 20
     """Failed connections in a row after which a server that has never answered in this run is given
     up and its models are stopped; also answers in a row with HTTP 2xx and no reply from one that
     has never given a reply."""
     timeout_s: TimeoutS = 300.0
-    """Longest wait for one reply [s]."""
+    """Maximum wait for one reply [s]."""
     batch_poll_s: TimeoutS = 60.0
-    """Longest pause between two looks at a batch [s], for models with batch: true."""
+    """Maximum time between two polls of a batch [s], for models with batch: true."""
     max_cost_usd: Cost | None = None
     """The run stops before it costs more than this [USD]; null: no limit."""
 
 
 @dataclass(frozen=True)
 class Variant:
-    """One choice of levels of the factors that a suite varies, as far as it differs from the
-    reference of its run.
+    """One combination of levels of the varied factors, without those at the reference level.
 
-    Another run may have another reference: names agree only where two suites vary the same.
+    Runs may have different references: names are comparable only if two suites vary the same.
     """
 
     levels: tuple[tuple[str, str], ...] = ()
@@ -211,12 +210,12 @@ class Variant:
 
     @property
     def repeat(self) -> int:
-        """The number of the time for which the same is asked, from 1."""
+        """The number of the repeat, from 1."""
         return int(dict(self.levels).get(REPEAT, "1"))
 
     @property
     def shown(self) -> Variant:
-        """The part of it that changes what is sent, the same for all repeats."""
+        """The part of it that changes requests, the same for all repeats."""
         return Variant(tuple(pair for pair in self.levels if pair[0] != REPEAT))
 
 
@@ -243,11 +242,11 @@ class VarySpec(Section):
     layout: Levels[PictureLayout] = ()
     """Layouts of pictures, as images.layout."""
     repeats: Annotated[int, Field(strict=True, ge=1, le=100)] = 1
-    """Number of times that the same request is sent. Only the first may be answered from the cache;
-    each sends another seed."""
+    """How often each request is sent. Only the first may be answered from the cache; each has
+    another seed."""
 
     def faults(self) -> Iterator[Fault]:
-        """Yield that two templates would have the same name in tables."""
+        """Yield a fault if two templates would have the same name in tables."""
         names = self.names("prompt")
         if twice := sorted({name for name in names if names.count(name) > 1}):
             allowed = "templates of different names"
@@ -259,18 +258,18 @@ class VarySpec(Section):
         return tuple(name for name in FACTORS if len(self.values(name)) > 1)
 
     def values(self, factor: str) -> tuple[Any, ...]:
-        """Return the levels of a factor as fields of the suite take them."""
+        """Return the levels of a factor as values of the suite's field."""
         levels = getattr(self, factor)
         return tuple(range(1, levels + 1)) if factor == REPEAT else tuple(levels)
 
     def names(self, factor: str) -> tuple[str, ...]:
-        """Return the levels of a factor as records and tables name them: a template by its file."""
+        """Return the names of a factor's levels in records and tables: a template by its file."""
         texts = map(str, self.values(factor))
         return tuple(PurePath(text).stem if text.endswith(".j2") else text for text in texts)
 
     @property
     def variants(self) -> tuple[Variant, ...]:
-        """All combinations of levels, the reference first, repeats of one behind one another."""
+        """All combinations of levels, the reference first, repeats of each in sequence."""
         shown = [name for name in self.factors if name != REPEAT]
         levels = [[(name, level) for level in self.names(name)] for name in shown]
         first = tuple(of_factor[0] for of_factor in levels)
@@ -292,10 +291,10 @@ def _with_value(spec: SectionT, path: tuple[str, ...], value: Any) -> SectionT:
 
 @dataclass(frozen=True)
 class SuiteFiles:
-    """The files that a suite was read from and names.
+    """The file of a suite, and the files that it names.
 
     `path` is the suite's own; `dataset` the absolute folder of the data set; `folders` are those of
-    data of their own by track, and `templates` prompts that are files, by track and the prompt's
+    tracks with their own data, and `templates` prompts that are files, by track and the prompt's
     text in the suite.
     """
 
@@ -307,35 +306,36 @@ class SuiteFiles:
 
 
 class Suite(Section):
-    """A suite: which models are asked about which scenes, how, and what is made of the replies."""
+    """A suite: models, scenes, presentation and scoring."""
 
     name: Annotated[str, form(r"^[a-z0-9][a-z0-9-]{0,63}$", f"up to 64 {HYPHENATED}")]
-    """Short name: small letters, digits and hyphens; runs are filed under it."""
+    """Short name: small letters, digits and hyphens. Run folders begin with it."""
     description: str = ""
-    """One line on what the suite is for."""
+    """One line on the purpose of the suite."""
     tracks: UniqueSome[Annotated[str, OneOf(known_tracks)]] = ("full_planning",)
     """The tracks to run."""
     dataset: DatasetSpec = DatasetSpec()
     levels: UniqueSome[Level] = (1, 2, 3, 4)
-    """Difficulty levels; 5 is of generated scenes alone."""
+    """Difficulty levels; only generated scenes have level 5."""
     limit: Count | None = None
-    """Most items of each track, spread over levels or subtasks; null: all. --limit overrides it."""
+    """Maximum number of items of each track, spread over levels or subtasks; null: all. --limit
+    overrides it."""
     settings: UniqueSome[Setting] = ("A", "B")
-    """A compares type, color and orientation, B type and color. One call is scored under each."""
+    """A compares type, color and orientation, B type and color. Each reply is scored under all."""
     seeds: UniqueSome[Seed] = (0,)
     """Each seed repeats every question."""
     models: Literal["recorded"] | UniqueSome[ModelName]
-    """Names from models.yaml or built-in baselines, group:NAME for all models of a group; or the
-    word recorded, for every folder of recorded replies in the official data."""
+    """Names from models.yaml or built-in baselines, group:NAME for all models of a group; or
+    `recorded` for every folder of recorded replies in the official data."""
     baselines: Unique[Annotated[str, OneOf(baseline_names)]] = ("goal-blind", "random")
-    """Built-in baselines that are scored beside the models of full_planning, where every track of
-    the suite has them; they cost nothing. []: none. A run of baselines alone has those it names."""
+    """Built-in baselines that are scored with the models of full_planning, if every track of the
+    suite has them; they cost nothing. []: none. A run with only baselines has those it names."""
     prompt: Prompt = "default"
-    """default; official (read out of the official checkout); or the path of a .j2 template,
-    relative to the suite file."""
+    """default; official (read from the official checkout); or the path of a .j2 template, relative
+    to the suite file."""
     answer_format: AnswerFormat = "text"
-    """text: lines of text. json_schema: one JSON object, whose schema the prompt states; it is also
-    sent as response_format where the provider takes one."""
+    """text: lines of text. json_schema: one JSON object, whose schema the prompt describes; it is
+    also sent as response_format if the provider accepts one."""
     images: ImagesSpec = ImagesSpec()
     candidates: CandidatesSpec = CandidatesSpec()
     parser: PlanParser = "steps"
@@ -351,7 +351,7 @@ class Suite(Section):
     _files: SuiteFiles | None = PrivateAttr(default=None)
 
     def faults(self) -> Iterator[Fault]:
-        """Yield the rules between fields that are broken."""
+        """Yield the broken rules between fields."""
         conflicts = list(self._conflicts())
         yield from conflicts
         for factor in self.vary.factors if not conflicts else ():
@@ -359,13 +359,13 @@ class Suite(Section):
 
     @property
     def files(self) -> SuiteFiles:
-        """The files that it was read from and names; LookupError for one without any."""
+        """The files of the suite. Raises LookupError if it was not read from a file."""
         if self._files is None:
             raise LookupError(f"the suite {self.name} was not read from a file")
         return self._files
 
     def with_files(self, files: SuiteFiles) -> Self:
-        """Return the suite as one that was read from these files."""
+        """Return the suite as if read from these files."""
         suite = self.model_copy()
         suite._files = files
         return suite
@@ -375,26 +375,26 @@ class Suite(Section):
         return self.files.source.where(path)
 
     def section(self, model: type[SectionT]) -> SectionT:
-        """Return the section of a track; LookupError where the suite was made without it."""
+        """Return the section of a track. Raises LookupError if the suite has none."""
         for name in type(self).model_fields:
             if isinstance(value := getattr(self, name), model):
                 return value
         raise LookupError(f"the suite has no section of {model.__name__}")
 
     def template(self, track: str) -> Path | None:
-        """Return the file that a track's prompt is read from; None for one that is bundled."""
+        """Return the file of a track's prompt, or None if it is bundled."""
         text = functools.reduce(getattr, known_track(track).prompt_field(), self)
         return self.files.templates.get((track, str(text)))
 
     def fields_of(self, factor: str) -> tuple[tuple[str, ...], ...]:
-        """Return the paths of the fields that a factor gives values to; none for repeats."""
+        """Return the paths of the fields that a factor sets; none for repeats."""
         if factor == "prompt":
             return tuple(known_track(name).prompt_field() for name in self.tracks)
         path = FACTORS[factor]
         return () if path is None else (path,)
 
     def at(self, variant: Variant) -> Self:
-        """Return the suite as a variant asks, its other factors at their reference."""
+        """Return the suite of a variant, with other factors at their reference."""
         suite = self
         levels = {name: self.vary.names(name)[0] for name in self.vary.factors}
         for factor, level in {**levels, **dict(variant.levels)}.items():
@@ -404,12 +404,11 @@ class Suite(Section):
         return suite
 
     def identity(self) -> dict[str, Any]:
-        """Return what determines the results, as JSON-able data, whatever the order of lists.
+        """Return everything that determines the results as JSON data, whatever the order of lists.
 
-        Leaves out name, description and limits, sections of tracks that are not run,
-        models, baselines, seeds, limit and paths (of data and templates): a run stores which models
-        were run, about which items, and the hashes of what stands at the paths, which say more and
-        survive a move.
+        Excludes name, description and limits, sections of tracks that are not run, models,
+        baselines, seeds, limit and paths (of data and templates): a run stores its models and
+        items, and digests of the files, which are more precise and survive a move.
         """
         sections = {kind.section: name for name, kind in known_tracks().items() if kind.section}
         idle = {key for key, track in sections.items() if track not in self.tracks}
@@ -429,7 +428,7 @@ class Suite(Section):
         return spec
 
     def _conflicts(self) -> Iterator[Fault]:
-        """Yield each rule between fields that is broken, at the field to change."""
+        """Yield each broken rule between fields, at the field to change."""
         official, recorded = self.dataset.format == "official", self.models == RECORDED
         as_json, shuffled = self.answer_format == "json_schema", self.candidates.order == "shuffled"
         official_prompt, own_pictures = self.prompt == "official", self.images.source == "dataset"
@@ -458,7 +457,7 @@ class Suite(Section):
                 yield Fault(message, at=tuple(name.split(".")), hint=hint)
 
     def _vary_faults(self, factor: str) -> Iterator[Fault]:
-        """Yield what is wrong with a factor: its tracks must know it, other fields allow it."""
+        """Yield the faults of a factor: its tracks must support it, and other fields allow it."""
         at, paths = ("vary", factor), self.fields_of(factor)
         for kind in map(known_track, self.tracks):
             if factor not in kind.varies:
@@ -505,15 +504,15 @@ def load_suite(
 ) -> Suite:
     """Read, override and validate a suite.
 
-    `overrides` are "key=value" texts. A file in one of `prompt_dirs` that is called as a bundled
-    prompt is used in its place where the suite says `default`. Raises SpecError with all that is
-    wrong, in the order of the file.
+    `overrides` are "key=value" texts. A file in one of `prompt_dirs` with the name of a bundled
+    prompt replaces it where the suite says `default`. Raises SpecError with all problems, in the
+    order of the file.
     """
     source = read_yaml(path)
     problems = apply_overrides(source, overrides)
     if source.data is None:
         raise SpecError([*problems, Problem(str(path), "is empty", allowed="a suite")])
-    # What varies has the values of the reference, wherever one value alone is asked for.
+    # Varied fields have the values of the reference, wherever a single value is needed.
     suite = read_section(suite_model(), source, problems).at(Variant())
 
     def existing(text: str, at: FieldPath, *, is_folder: bool = False) -> Path:

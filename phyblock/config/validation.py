@@ -1,7 +1,7 @@
 """Validation against pydantic models: every error in plain words and at its place.
 
-Types say what a single value may be; relations between values are functions that yield `Fault`s.
-`problems_of` puts what pydantic found into words, for YAML as for lines of JSON.
+Types describe single values; rules between values are functions that yield `Fault`s. `problems_of`
+translates pydantic's errors, for YAML and for lines of JSON.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ ModelT = TypeVar("ModelT", bound=BaseModel)
 ItemT = TypeVar("ItemT", bound=Hashable)
 
 _MOST = 100
-"""Problems of one value that are reported."""
+"""Maximum number of reported problems per value."""
 _FAULT = "fault"
 _TYPE, _RANGE = "has the wrong type", "is out of range"
 _CHOICE = "is not one of the choices"
@@ -74,15 +74,15 @@ _MESSAGES: dict[str, tuple[str, str]] = {
     "string_too_long": ("is too long", "at most {max_length}"),
     "string_pattern_mismatch": ("has the wrong form", "{pattern}"),
 }
-"""Message and allowed values, by pydantic's types of errors."""
+"""Message and allowed values, by pydantic's error types."""
 _FORMS: dict[str, str] = {}
-"""Regular expressions of texts in words."""
+"""Descriptions of regular expressions."""
 
 
 class Fault(NamedTuple):
-    """One thing that is wrong; `at` is its place inside the value that was checked.
+    """One problem; `at` is its place inside the checked value.
 
-    `found` is shown as it is; None shows the value at the place. `key` says that the key is meant.
+    `found` is shown as it is; None shows the value at the place. `key` means that the key is wrong.
     """
 
     message: str
@@ -94,7 +94,7 @@ class Fault(NamedTuple):
 
 
 def fault(*faults: Fault) -> ValidationError:
-    """Return what a validator raises to report these faults."""
+    """Return the exception that a validator raises to report these faults."""
     lines = [
         InitErrorDetails(
             type=PydanticCustomError(_FAULT, "{message}", one._asdict()), loc=one.at, input=None
@@ -105,13 +105,13 @@ def fault(*faults: Fault) -> ValidationError:
 
 
 def form(pattern: str, words: str) -> Any:
-    """Return the bound of a text to a regular expression, which errors put into words."""
+    """Return the constraint of a text to a regular expression, which errors describe in words."""
     _FORMS[pattern] = words
     return Field(pattern=pattern)
 
 
 def checked(find: Callable[[Any], Iterable[Fault]]) -> AfterValidator:
-    """Return a check that `find` finds nothing in a value, whose parts are valid."""
+    """Return a validator that `find` yields no faults for a value with valid parts."""
 
     def check(value: Any) -> Any:
         if faults := tuple(find(value)):
@@ -122,12 +122,12 @@ def checked(find: Callable[[Any], Iterable[Fault]]) -> AfterValidator:
 
 
 class Section(BaseModel):
-    """Base of all that is written in YAML: no unknown keys, no changes after reading."""
+    """Base of all YAML models: no unknown keys, frozen."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
 
     def faults(self) -> Iterator[Fault]:
-        """Yield what is wrong between fields, each of which is valid."""
+        """Yield faults between fields, each of which is valid."""
         yield from ()
 
     @model_validator(mode="after")
@@ -139,7 +139,7 @@ class Section(BaseModel):
 
 @dataclass(frozen=True)
 class OneOf:
-    """The check of a value that is in a list when it is read: plugins add words to it."""
+    """A check that a value is in a list at validation time, to which plugins may add."""
 
     choices: Callable[[], Iterable[Any]]
 
@@ -198,17 +198,17 @@ TemplateName = Literal["default"] | Template
 
 
 class PictureControls(Section):
-    """Controls of a track's section that find out what answers owe to the picture."""
+    """Controls of a track's section that measure how much answers depend on pictures."""
 
     blind: Flag = False
-    """Leave out the picture of the goal; for questions, all pictures."""
+    """Do not send the picture of the goal; for questions, any picture."""
 
 
 def read_section(model: type[ModelT], source: YamlSource, more: Sequence[Problem] = ()) -> ModelT:
-    """Return a document that people write, as its model.
+    """Return a YAML document as its model.
 
-    Raises SpecError with everything that is wrong, `more` included, in the order of the file. A
-    text that looks like a key is wrong and is not shown, so that none reaches a run folder.
+    Raises SpecError with all problems, including `more`, in the order of the file. A text that
+    looks like an API key is a problem and is not shown, so that no key reaches a run folder.
     """
     problems = [*more, *secrets(source)]
     instance = None
@@ -231,10 +231,10 @@ def problems_of(
     source: YamlSource | str,
     base: FieldPath = (),
 ) -> list[Problem]:
-    """Return what pydantic found wrong with `data`, in words.
+    """Return pydantic's errors about `data` as problems, in words.
 
-    The data stands at `base` of a YAML source, or all at one place. What the members of a union
-    have against the same value is one problem, and none where a part of the value is at fault.
+    The data is at `base` of a YAML source, or all at one place. Errors of several union members
+    about the same value are one problem, and none if a part of the value has a problem.
     """
     problems: dict[tuple[FieldPath, str], Problem] = {}
     above: set[FieldPath] = set()
@@ -274,7 +274,7 @@ def _located(detail: ErrorDetails, data: object) -> tuple[FieldPath, Any]:
 
 
 def _fault(detail: ErrorDetails, path: FieldPath, value: Any, model: type[BaseModel]) -> Fault:
-    """Return an error of pydantic's in our words."""
+    """Return a pydantic error in plain words."""
     kind, context = detail["type"], detail.get("ctx", {})
     message, allowed = _MESSAGES.get(kind, (detail["msg"].lower(), ""))
     name = str(path[-1]) if path else ""
@@ -313,7 +313,7 @@ def _fault(detail: ErrorDetails, path: FieldPath, value: Any, model: type[BaseMo
 
 
 def _listed(name: str, value: Any) -> str:
-    """Return the list that a value without brackets probably means; "" where it is not clear."""
+    """Return the list that a value without brackets probably means, or "" if unclear."""
     if type(value) is int and name == "seeds":
         return str([*range(value)]) if 0 < value <= 10 else ""
     if type(value) is int:
@@ -326,7 +326,7 @@ def _listed(name: str, value: Any) -> str:
 
 
 def _section(model: type[BaseModel], path: FieldPath) -> type[BaseModel]:
-    """Return the model that describes what stands at `path`, or the nearest around it."""
+    """Return the model of the value at `path`, or the nearest one around it."""
     if issubclass(model, RootModel):
         (((model,),), path) = _parts(model).values(), path[1:]
     for part in path:
@@ -335,7 +335,7 @@ def _section(model: type[BaseModel], path: FieldPath) -> type[BaseModel]:
 
 
 def _parts(model: type[BaseModel]) -> dict[str, list[type[BaseModel]]]:
-    """Return the models in the types of a model's fields, by the names that people write."""
+    """Return the models in the types of a model's fields, by the names used in files."""
     fields = {field.alias or name: field for name, field in model.model_fields.items()}
     return {
         name: _models_in(field.annotation) for name, field in fields.items() if not field.exclude
@@ -343,7 +343,7 @@ def _parts(model: type[BaseModel]) -> dict[str, list[type[BaseModel]]]:
 
 
 def _models_in(hint: Any) -> list[type[BaseModel]]:
-    """Return the models that a type is made of."""
+    """Return the models in a type."""
     if isinstance(hint, type) and issubclass(hint, BaseModel):
         return [hint]
     return [part for argument in get_args(hint) for part in _models_in(argument)]

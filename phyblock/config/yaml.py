@@ -2,7 +2,7 @@
 
 Scalars follow YAML 1.2's core schema, not PyYAML's 1.1: `on`, `no` and dates are text, `1e-3` is
 a number, `010` is ten. Keys are always text, as written. Only plain data is read: anchors, but no
-merge keys (`<<`), no tags beyond the standard ones, no key twice, no infinity.
+merge keys (`<<`), no tags beyond the standard ones, no duplicate keys, no infinity.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from phyblock.types import QUOTE_HINT
 FieldPath = tuple[str | int, ...]
 
 LARGEST_YAML_BYTES = 256 * 1024
-"""Default limit of a file: some fifty times what the largest honest ones hold."""
+"""Default limit of a file: about fifty times the largest legitimate one."""
 _BYTES_A_VALUE = 12
-"""A file of the largest size holds at most a value for so many bytes, aliases expanded."""
+"""A file holds at most one value per this many bytes of the size limit, with aliases expanded."""
 _DEEPEST = 64
 _LONGEST_NUMBER = 300
 _TOO_DEEP = f"is nested more than {_DEEPEST} levels deep"
@@ -58,7 +58,7 @@ def looks_secret(text: str) -> bool:
 
 
 def shown(value: object) -> str:
-    """Return a value as JSON, as far as it is shown, whatever it is; secrets are hidden."""
+    """Return any value as JSON for messages, cut if it is long; secrets are hidden."""
     text = ""
     try:
         for part in _ENCODER.iterencode(value):
@@ -74,16 +74,16 @@ def shown(value: object) -> str:
 
 
 def dotted(path: FieldPath) -> str:
-    """Return a path as people write it: `images.order[1]`."""
+    """Return a path in dotted form: `images.order[1]`."""
     text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path)
     return text.removeprefix(".")
 
 
 def expand(text: str, base: Path) -> Path:
-    """Return the absolute path that `text` means, seen from the folder `base`.
+    """Return the absolute path of `text`, relative to the folder `base`.
 
-    `~` and $VARIABLES are expanded. Raises ValueError, with a message for the user, for a variable
-    that is not set, or a name that is not UTF-8.
+    `~` and $VARIABLES are expanded. Raises ValueError, with a message for the user, if a variable
+    is not set, or a name is not UTF-8.
     """
     expanded = os.path.expandvars(os.path.expanduser(text))
     if unset := re.search(r"\$\{?(\w+)", expanded):
@@ -98,10 +98,10 @@ def expand(text: str, base: Path) -> Path:
 
 @dataclass
 class YamlSource:
-    """A YAML document: its data and where each part stands.
+    """A YAML document: its data and the place of each part.
 
-    `marks` are the marks of the key and of the value of each path; `overridden` the "--set ..."
-    texts by the paths that they set.
+    `marks` are the marks of key and value of each path; `overridden` are the "--set ..." texts by
+    the paths that they set.
     """
 
     label: str
@@ -111,7 +111,7 @@ class YamlSource:
     _lines: dict[str, tuple[int, int]] = field(default_factory=dict)
 
     def where(self, path: FieldPath, *, key: bool = False) -> str:
-        """Return the place of the value at `path` (or of its key), or of the nearest around it."""
+        """Return the place of the value at `path` (or of its key), or the nearest around it."""
         ends = [path[:end] for end in range(len(path), -1, -1)]
         if place := next((self.overridden[end] for end in ends if end in self.overridden), None):
             return place
@@ -122,7 +122,7 @@ class YamlSource:
         return place
 
     def in_order(self, problems: Iterable[Problem]) -> list[Problem]:
-        """Return problems as they stand in the file, those of the command line last."""
+        """Return problems in the order of the file, those of the command line last."""
         last = (1 << 30, 0)
         return sorted(problems, key=lambda problem: self._lines.get(problem.where, last))
 
@@ -140,13 +140,13 @@ class _Loader(yaml.SafeLoader):
 
 
 class _Dumper(yaml.SafeDumper):
-    """Quotes texts that either schema would take for something else; repeats what stands twice."""
+    """Quotes texts that either schema would misread; writes repeated values without aliases."""
 
     def ignore_aliases(self, _: object) -> bool:
         return True
 
     def represent_str(self, text: str) -> yaml.ScalarNode:
-        # PyYAML would fold other line breaks than its own.
+        # PyYAML would fold other line breaks than newlines.
         style = '"' if re.search("[\x85\u2028\u2029]", text) else None
         return self.represent_scalar(_TAG + "str", text, style)
 
@@ -170,13 +170,13 @@ for _kind, _pattern, _first in (
 
 
 def dump_yaml(data: object) -> str:
-    """Return plain data as YAML that `parse_yaml` reads again as it is."""
+    """Return plain data as YAML that `parse_yaml` reads back unchanged."""
     text: str = yaml.dump(data, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=100)
     return text
 
 
 def read_yaml(path: Path) -> YamlSource:
-    """Read a file; SpecError where it cannot be read or is not YAML."""
+    """Read a file. Raises SpecError if it cannot be read or is not YAML."""
     try:
         text = read_text(path, LARGEST_YAML_BYTES)
     except (OSError, ValueError) as error:
@@ -187,8 +187,8 @@ def read_yaml(path: Path) -> YamlSource:
 def parse_yaml(text: str, label: str, most_bytes: int = LARGEST_YAML_BYTES) -> YamlSource:
     """Read a text.
 
-    Raises SpecError where it is not YAML, holds more than plain data, or is larger or deeper than
-    any honest file.
+    Raises SpecError if it is not YAML, holds more than plain data, or is larger or deeper than any
+    legitimate file.
     """
     if len(text) > most_bytes:
         found, allowed = f"{len(text):,} characters", f"{most_bytes // 1024:,} kB at most"
@@ -237,7 +237,7 @@ class _Walker:
         if self._left < 0:
             raise self._error(node, path, f"is one of more than {self._most_values:,} values")
         if len(path) > _DEEPEST:
-            # Aliases may nest deeper than the text, and hold themselves.
+            # Aliases may nest deeper than the text, and contain themselves.
             raise self._error(node, path[:2], _TOO_DEEP)
         kind = node.tag.removeprefix(_TAG)
         if isinstance(node, yaml.MappingNode) and kind == "map":
@@ -273,7 +273,7 @@ class _Walker:
             if kind == "int":
                 return int(lower, {"0o": 8, "0x": 16}.get(lower[:2], 10))
             if kind == "float":
-                # Infinity and NaN, which YAML writes with a point, are no numbers here.
+                # Infinity and NaN (`.inf`, `.nan` in YAML) are not allowed.
                 return float(lower)
         except ValueError:
             raise self._error(node, path, "is not a finite number", shown(text)) from None
@@ -284,7 +284,7 @@ class _Walker:
         raise self._error(node, path, "has a tag that is not allowed", node.tag)
 
     def _text(self, node: yaml.ScalarNode, path: FieldPath) -> str:
-        """Return the node's text with surrogate pairs (JSON's escapes) joined."""
+        """Return the node's text with surrogate pairs (from JSON escapes) joined."""
         try:
             return str(node.value).encode("utf-16", "surrogatepass").decode("utf-16")
         except UnicodeDecodeError:
@@ -299,7 +299,7 @@ class _Walker:
 
 
 def secrets(source: YamlSource) -> list[Problem]:
-    """Return a problem for each text that looks like a provider's key, which no file may hold."""
+    """Return a problem for each text that looks like a provider's key."""
     hint = "name an environment variable with api_key_env, and keep the key in it"
 
     def below(data: object, path: FieldPath) -> Iterator[Problem]:
@@ -316,10 +316,10 @@ def secrets(source: YamlSource) -> list[Problem]:
 
 
 def apply_overrides(source: YamlSource, overrides: Iterable[str]) -> list[Problem]:
-    """Put each "key=value" into the source's data, as if the file said so.
+    """Set each "key=value" in the source's data, as if it were in the file.
 
-    Keys are dotted; values are YAML. A later override of the same key wins. Returns what is wrong
-    with the form of overrides; keys and values are judged with the rest of the file.
+    Keys are dotted; values are YAML. A later override of the same key wins. Returns the problems of
+    malformed overrides; keys and values are validated with the rest of the file.
     """
     problems: list[Problem] = []
     for text in overrides:

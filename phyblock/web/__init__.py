@@ -1,1 +1,1 @@
-"""Pages: the report of a run, the leaderboard of several, the page where a person answers."""
+"""Pages: the report of a run, the leaderboard of several runs, the page of human baselines."""

@@ -1,4 +1,4 @@
-"""Runs as numbers of a page: models with values, ranks and facts, and the finding in words."""
+"""The numbers of a page about runs: models with values, ranks and facts, and a summary sentence."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ from phyblock.tracks.base import kind_of
 from phyblock.types import WITHOUT_REPLY
 
 _LABELS = ("published", "size_b", "served_at")
-"""Parts of a manifest's model that do not decide its replies."""
+"""Parts of a manifest's model that do not affect its replies."""
 _MOST_CHARACTERS = 160
 
 
 @dataclass(frozen=True)
 class Sources:
-    """Tasks by scene id, and items that are more than scenes by track; where there are none,
-    `lacking` says why.
+    """Tasks by scene id, and items that are more than scenes by track; if there are none, `lacking`
+    is the reason.
     """
 
     tasks: Mapping[str, AssemblyTask] = field(default_factory=dict)
@@ -50,10 +50,10 @@ class Sources:
 
 
 def open_sources(run: Run, data: Path | None) -> Sources:
-    """Return the scenes of a run, from `data` or from where the run found them, and what else
-    its tracks asked about. Without them a page shows every reply and score, but cannot draw.
+    """Return the scenes of a run, from `data` or the path in the manifest, and the other items of
+    its tracks. Without them a page shows every reply and score, but no drawings.
 
-    Raises DataError when `data` is given and is not what the run was made on.
+    Raises DataError if `data` is given and is not the data of the run.
     """
     try:
         dataset = recorded_dataset(run.path, run.manifest, data)
@@ -71,7 +71,7 @@ def open_sources(run: Run, data: Path | None) -> Sources:
 
 @dataclass
 class Entry:
-    """A row: `runs` has the number of the run that asked each of its tracks. `name` is unique."""
+    """A row: `runs` has the number of the run of each of its tracks. `name` is unique."""
 
     model: ManifestModel
     runs: dict[str, int] = field(default_factory=dict)
@@ -80,13 +80,13 @@ class Entry:
 
 @dataclass(frozen=True, eq=False)
 class TrackValues:
-    """A track of a run: `values` by setting, model and heading; `samples` what each sample is worth
-    by the main measure, in its unit, by model and its scene, item, seed and variant, without those
+    """A track of a run: `values` by setting, model and heading; `samples`, the values of samples by
+    the main measure, in its unit, by model and by scene, item, seed and variant, without samples
     that have no value; `facts` by model.
 
-    Settings are those of the run, or "" alone where the track knows none. Facts are of the table of
-    coverage, None where one is not known; of the samples, `solved` are worth all that one can be,
-    None where one may always be worth more; `errors` are shares of wrong steps [%].
+    Settings are those of the run, or only "" if the track has none. Facts are those of the table of
+    coverage, None if unknown; `solved` is the number of samples with the best possible value, None
+    if there is no best; `errors` are shares of wrong steps [%].
     """
 
     values: Mapping[str, Mapping[tuple[str, str], Value]]
@@ -96,9 +96,9 @@ class TrackValues:
 
 @dataclass(frozen=True, eq=False)
 class SiteRun:
-    """A run that was opened: `where` is what the user calls it, `sources` are what can be drawn of
-    it. `unverified` says what was taken as a bundle says it; None for a folder, which is not
-    scored again.
+    """An opened run: `where` is the path that the user gave, `sources` are the data to draw from.
+    `unverified` lists what was not checked in a bundle; None for a folder, which is not scored
+    again.
     """
 
     where: str
@@ -120,13 +120,12 @@ class SiteRun:
 def entries_of(runs: Sequence[SiteRun]) -> tuple[Entry, ...]:
     """Return every model of every run.
 
-    A model that two runs asked in different tracks is one row, where it is the same model with the
-    same parameters. Asked in the same track it is a row for each run, told apart by the date and
-    the identity of the run.
+    The same model with the same parameters, asked by two runs in different tracks, is one row. If
+    runs asked it in the same track, it has a row for each, with the date and identity of the run.
     """
     found: list[tuple[dict[str, Any], Entry]] = []
     for number, one in enumerate(runs):
-        # A run stands in the same row as a folder and as a bundle.
+        # A run has the same row as a folder and as a bundle.
         for model in portable_manifest(one.run.manifest).models:
             told = {name: value for name, value in model.fields().items() if name not in _LABELS}
             for known, entry in found:
@@ -178,7 +177,7 @@ def values_of(run: Run, track: str) -> TrackValues:
 
 
 def board_of(runs: Sequence[SiteRun], entries: Sequence[Entry]) -> dict[str, Any]:
-    """Return the numbers that a page shows, as plain values.
+    """Return the numbers of a page, as plain values.
 
     Raises SpecError for runs that cannot be compared.
     """
@@ -256,7 +255,7 @@ def _id(track: str, setting: str, heading: str) -> str:
 
 
 def _track(track: str, run: Run, models: Sequence[Value]) -> dict[str, Any]:
-    """Return a track of a page, and how many `models`, no baselines, are above the blind ones."""
+    """Return a track of a page; `models`, without baselines, are compared with the blind ones."""
     kind, headline, finding = kind_of(track), Headline(run, track), ""
     measure, floor, parts = headline.measure, headline.floor, kind.report().part_names
     names = (one.name for one in track_measures(track))
@@ -304,7 +303,7 @@ def _run(one: SiteRun) -> dict[str, Any]:
 
 
 def shortfalls(run: Run, track: str) -> Mapping[str, str]:
-    """Return by model that lacks replies in a track how many it has, and why it has no more."""
+    """Return, for each model that lacks replies in a track, their number and the reason."""
     table, stopped = coverage_frame(run), read_stopped(run.path).models
     failed = run.records[run.records["error_kind"].notna() & (run.records["track"] == track)]
     told = failed[["model", "error_kind", "error_status", "error_message"]]
@@ -325,6 +324,6 @@ def shortfalls(run: Run, track: str) -> Mapping[str, str]:
 
 
 def short(message: str) -> str:
-    """Return a message in one short line, without the stop at its end."""
+    """Return a message as one short line, without a final period."""
     text = " ".join(message.split()).rstrip(".")
     return text if len(text) <= _MOST_CHARACTERS else f"{text[:_MOST_CHARACTERS].rstrip()} …"

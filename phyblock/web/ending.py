@@ -30,10 +30,10 @@ _SIZE_PX, _GAP_PX = 320, 8
 
 
 class Ending:
-    """The page after the end: a part for each track, in it the means of the person, the
-    rules and the models of this run and those `beside` it, and a row for each item.
+    """The page after the end: for each track the means of the person, the rules and the models of
+    this run and those `beside` it, and a row for each item.
 
-    Of a run that cannot be compared a note says why. Pictures are drawn as they are asked for.
+    A note explains why a run cannot be compared. Pictures are drawn on request.
     """
 
     def __init__(
@@ -57,7 +57,7 @@ class Ending:
         }
 
     def picture(self, name: str) -> bytes | None:
-        """Return the card, or the goal beside what was built for an item; None for other names."""
+        """Return the card, or the goal beside the built structure; None for other names."""
         if (found := _BUILT.fullmatch(name)) and int(found[1]) in self._films:
             return to_png(self._pair(int(found[1])))
         if name != CARD or not self.shown["tracks"]:
@@ -71,7 +71,7 @@ class Ending:
         return card_png("Can you build this?", f"{said}\n{about}", pair)
 
     def _pair(self, number: int) -> Image.Image:
-        """Return the goal on the left and what was built on the right."""
+        """Return a picture of the goal on the left and the built structure on the right."""
         task, last = self._films[number]
         lookout = Lookout(task.scene, PictureStyle(_SIZE_PX))
         pair = Image.new("RGB", (2 * _SIZE_PX + _GAP_PX, _SIZE_PX), "#ffffff")
@@ -135,7 +135,7 @@ class Ending:
 
 
 def went(record: Record, matcher: str) -> dict[str, Any]:
-    """Return what was answered, step by step with why a step is wrong, or with what is right."""
+    """Return the answer, step by step with the reason for wrong ones, or with the right answer."""
     if record.is_correct is not None:
         return {"given": record.said, "right": record.target, "correct": record.is_correct}
     course = record.course(matcher)

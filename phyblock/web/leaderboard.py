@@ -1,4 +1,4 @@
-"""Several runs as one leaderboard: a static folder that opens from disk or from any web server."""
+"""Several runs as one leaderboard: a static folder, opened from disk or from any web server."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _MAY_DIFFER = ("pictures",)
 """Parts of a track's identity: digests of pictures, which change with their size."""
 _CONTROLS = frozenset({"blind", "prompt", "path", "size_px"})
 """Fields of pictures and of a track's section of the suite that may differ, are shown with the run,
-or are known by their digest.
+or are compared by their digest.
 """
 _HINTS = {
     "sha256": "give all runs the same levels and --limit, or make a site of each",
@@ -46,8 +46,8 @@ _ABOUT = (
 
 @dataclass
 class SiteWritten:
-    """A site: its page, models with baselines, samples and size, and why it draws nothing ("": it
-    does).
+    """A written site: its page, numbers of models (with baselines) and samples, size, and the
+    reason why it draws nothing, or "".
     """
 
     path: Path
@@ -60,12 +60,12 @@ class SiteWritten:
 def write_site(
     paths: Sequence[Path], out: Path, data: Sequence[Path] = (), title: str = "PhyBlock leaderboard"
 ) -> SiteWritten:
-    """Put run folders and bundles into one static folder, the same bytes for the same runs.
+    """Write run folders and bundles as one static folder, the same bytes for the same runs.
 
-    The page is written last and whole, so that a build that was stopped never looks like a site,
-    and one that was there stays as it is until then. Raises SpecError for runs that cannot stand in
-    one table, StoreError for what is no run, a bundle that does not verify, or a folder that holds
-    what we did not write, DataError for a bundle whose data are not at hand.
+    The page is written last and atomically, so that an interrupted build never looks like a site,
+    and an existing site stays unchanged until then. Raises SpecError for runs that cannot share a
+    table, StoreError for a path that is not a run, a bundle that does not verify, or a folder that
+    holds files of others, DataError for a bundle whose data are not found.
     """
     if not paths:
         raise SpecError(Problem("site", "needs a run", allowed="run folders and bundles"))
@@ -108,7 +108,7 @@ def write_site(
 
 
 def _check_place(folder: OutFolder) -> None:
-    """Raise StoreError unless the folder is new, empty, or one that a site was written into."""
+    """Raise StoreError unless the folder is new, empty, or holds a site."""
     out = folder.path
     if out.exists() and not out.is_dir():
         raise StoreError(Problem(str(out), "is no folder"))
@@ -125,9 +125,9 @@ def _check_place(folder: OutFolder) -> None:
 def open_runs(paths: Sequence[Path], data: Sequence[Path], kept: ExitStack) -> tuple[SiteRun, ...]:
     """Open runs in the order given; bundles stay unpacked as long as `kept` is open.
 
-    `data` are folders to look for data in, beside where runs found them and what comes with
-    phyblock. Raises SpecError for a run that is given twice, StoreError for what is no run or does
-    not verify, and DataError for a bundle whose data are not at hand.
+    `data` are folders to look for data in, besides the paths in manifests and the bundled sets.
+    Raises SpecError for a run that is given twice, StoreError for a path that is not a run or does
+    not verify, and DataError for a bundle whose data are not found.
     """
     opened: list[SiteRun] = []
     seen: dict[str, str] = {}
@@ -154,11 +154,11 @@ def open_runs(paths: Sequence[Path], data: Sequence[Path], kept: ExitStack) -> t
 
 
 def check_runs_alike(runs: Sequence[SiteRun]) -> None:
-    """Raise SpecError naming all in which a run differs from the first that it could be held
-    against, so that they cannot stand in one table.
+    """Raise SpecError naming all differences between a run and an earlier one that keep them from
+    sharing a table.
 
-    All must be of one version of one data set. Those that share a track must have asked about the
-    same items of it, in the same words, shown alike in any size, and count in the same way.
+    All runs must use one version of one data set. Runs that share a track must agree in its items,
+    prompt, pictures (in any size) and counts.
     """
     problems: list[Problem] = []
     for number, one in enumerate(runs):
@@ -169,7 +169,7 @@ def check_runs_alike(runs: Sequence[SiteRun]) -> None:
             differences = [
                 Problem(one.where, message, name, str(value), str(other), hint)
                 for name, value in told.items()
-                # A recording was asked elsewhere, and a baseline is asked in no words.
+                # The prompt of a recording is unknown, and a baseline has none.
                 if None not in (value, other := wanted.get(name)) and value != other
                 for hint in [_HINTS.get(name.rpartition(".")[2], "make a site of each")]
             ]
@@ -181,7 +181,7 @@ def check_runs_alike(runs: Sequence[SiteRun]) -> None:
 
 
 def _facts(run: Run, shared: Sequence[str]) -> dict[str, Any]:
-    """Return what has to agree, by name; None where it is not said."""
+    """Return the facts that have to agree, by name; None for unknown ones."""
     manifest, suite, data = run.manifest, run.design.suite, run.manifest.dataset
     found: dict[str, Any] = {
         "dataset.name": data and data.name,
@@ -201,7 +201,7 @@ def _facts(run: Run, shared: Sequence[str]) -> dict[str, Any]:
         identity, kind = manifest.tracks.get(track, {}), kind_of(track)
         for key, value in identity.items():
             if isinstance(value, Mapping) and {"name", "version"} <= value.keys():
-                # A prompt by its name and digest.
+                # A prompt is known by its name and digest.
                 value = f"{value['name']} ({str(value['version'])[:12]})"
             if key not in _MAY_DIFFER:
                 found[f"tracks.{track}.{key}"] = value

@@ -1,8 +1,8 @@
 """Files of a page: its HTML, and beside it data as scripts, three.js, and pictures as sent.
 
-A page that was opened from disk may load scripts, but not fetch files. A script calls
-`phyblockTake(build, name, text)`; the text is JSON, deflated, in base 64, so that nothing that a
-model said is ever read as code.
+A page that is opened from disk may load scripts, but not fetch files. A script calls
+`phyblockTake(build, name, text)`; the text is deflated JSON in base 64, so that nothing in a reply
+is ever run as code.
 """
 
 from __future__ import annotations
@@ -43,9 +43,9 @@ _LAYOUT = 7
 _CHUNK_CHARACTERS = 400_000
 _DIGITS = 24
 _DECIMALS = 6
-"""Decimals of numbers that pages draw by."""
+"""Decimals of numbers used for drawing."""
 PICTURES = "report/pictures/"
-"""The folder of pictures that were sent, below that of a run."""
+"""The folder of sent pictures in a run's folder."""
 _SCRIPTS = (
     *("dom.js", "data.js", "solid.js", "steps.js", "poses.js", "stage.js", "quotes.js"),
     *("sample.js", "list.js", "table.js", "charts.js", "results.js", "views.js", "app.js"),
@@ -56,20 +56,20 @@ _LEFT_OUT = frozenset(
         *("variant", "outcome", "run", "time", "counts", "prompt", "turns", "reply", "scores"),
     }
 )
-"""Fields of records that the index has, that a page does not show, or shows in another form."""
+"""Fields of records that the index has, or that a page does not show as they are."""
 _OF_QUESTION = ("subtask", "text", "options", "answer_letters", "pictures", "evidence")
 _LONGEST = {"text": 6000, "reasoning": 2000}
 """Characters of a reply that a site shows; the bundle has all of it."""
 _CARD_PX = (1200, 630)
 _TELLING_BLOCKS = 6
-"""A failure tells most where its goal has about so many blocks."""
+"""A failure is most instructive if its goal has about this many blocks."""
 
 
 class Pack:
     """Entries of one kind in numbered scripts, written as they fill.
 
-    `starts` holds the number of the first entry of every script. Methods raise OSError where the
-    disk refuses.
+    `starts` holds the number of the first entry of every script. Methods raise OSError if the disk
+    fails.
     """
 
     def __init__(self, folder: Path, kind: str, build: str) -> None:
@@ -89,7 +89,7 @@ class Pack:
         return self._count - 1
 
     def close(self) -> None:
-        """Write what is left."""
+        """Write the remaining entries."""
         if self._entries:
             name = f"{self._kind}-{len(self.starts)}"
             _write(self._folder, name, self._build, f"[{','.join(self._entries)}]")
@@ -109,8 +109,8 @@ def _write(folder: Path, name: str, build: str, text: str) -> None:
 
 def _write_three(folder: Path) -> None:
     """Write three.js as the script `three.js`, which names it `THREE`."""
-    # Its published build is of two modules, which a page that was opened from disk may not load;
-    # what they import and export becomes what functions take and return.
+    # Its published build has two modules, which a page opened from disk may not load; their imports
+    # and exports become arguments and results of functions.
     core, module = (asset(f"three/three.{name}.min.js").decode() for name in ("core", "module"))
     names, source = r"(\{[^}]*\})", r'from"\./three\.core\.min\.js";?'
     exported = partial(re.sub, r"([\w$]+) as ([\w$]+)", r"\2:\1")
@@ -131,7 +131,7 @@ def _write_three(folder: Path) -> None:
 
 
 def build_of(*told: object) -> str:
-    """Return a name for what a page shows: the same runs, written again, have the same files."""
+    """Return a name for the content of a page: the same runs always have the same files."""
     return hex_digest(json.dumps([_LAYOUT, version("phyblock"), *told]))[:12]
 
 
@@ -148,9 +148,9 @@ def pack_samples(
     """Write the scripts of single samples and three.js; return the index of all samples and items
     as columns, which is the script `samples`.
 
-    Every sample has its newest record, with the prompt as sent where there is `sent`, and with long
-    replies cut where it `is_cut`. Of `failures` samples the index says that they tell how models
-    fail. Raises OSError where the disk refuses, StoreError for a record that cannot be read.
+    Every sample has its newest record, with the prompt as sent if `sent` is given, and with long
+    replies cut if it `is_cut`. The index names up to `failures` samples that show how models fail.
+    Raises OSError if the disk fails, StoreError for an unreadable record.
     """
     packs = {
         kind: Pack(folder, kind, build) for kind in ("records", "scenes", "questions", "prompts")
@@ -253,7 +253,7 @@ def _entry(
     sent: SentPictures | None,
     is_cut: bool,
 ) -> dict[str, Any]:
-    """Return a record as pages take it."""
+    """Return a record as data of a page."""
 
     def prompt(one: SentPrompt | None) -> dict[str, Any]:
         if one is None or sent is None:
@@ -283,7 +283,7 @@ def _entry(
             for told, turn in turns
         ]
     if record.reply is not None:
-        # An episode's replies stand in its turns.
+        # An episode's replies are in its turns.
         own = reply(fields["reply"])
         entry["reply"] = {**own, "text": "", "reasoning": ""} if record.asked_turns else own
     entry["scores"] = [
@@ -295,7 +295,7 @@ def _entry(
 
 
 class _Failure(NamedTuple):
-    """The first wrong step of a sample, its model and row; it `tells` more the larger this is."""
+    """The first wrong step of a sample, its model and row, and how instructive it is."""
 
     error: str
     model: str
@@ -304,7 +304,7 @@ class _Failure(NamedTuple):
 
 
 def _telling(found: list[_Failure], most: int) -> list[int]:
-    """Return rows of samples that tell most: of every type of error, and of other models."""
+    """Return rows of the most instructive samples, of all types of error and many models."""
     chosen: list[_Failure] = []
 
     def order(one: _Failure) -> tuple[int, int, float, int]:
@@ -317,7 +317,7 @@ def _telling(found: list[_Failure], most: int) -> list[int]:
 
 
 def _plain(value: Any) -> Any:
-    """Return dataclasses as pages take them: fields by names without units, numbers rounded."""
+    """Return dataclasses as data of a page: fields by names without units, numbers rounded."""
     if is_dataclass(value):
         named = ((re.sub("_(m|deg)$", "", one.name), one.name) for one in dataclass_fields(value))
         return {name: _plain(getattr(value, field)) for name, field in named}
@@ -327,7 +327,7 @@ def _plain(value: Any) -> Any:
 
 
 def _scene(task: AssemblyTask) -> dict[str, Any]:
-    """Return a scene as pages take it; `depend` has places of blocks, `candidate` a number."""
+    """Return a scene as data of a page; `depend` has places of blocks, `candidate` a number."""
     blocks = [
         {
             **_plain(block),
@@ -340,14 +340,14 @@ def _scene(task: AssemblyTask) -> dict[str, Any]:
 
 
 class SentPictures:
-    """Pictures that were sent, put into `folder` as they are asked for by their digests.
+    """Sent pictures, put into `folder` on request by their digests.
 
-    They are found in the picture cache and among the data set's own; nothing is rendered. Files are
-    hard links into the cache where that is possible, else copies.
+    They come from the picture cache and the data set; nothing is rendered. Files are hard links
+    into the cache if possible, else copies.
     """
 
     def __init__(self, folder: Path, earlier: Path, sources: Sources) -> None:
-        """Take what `earlier` holds as there."""
+        """Pictures that `earlier` holds need not be added."""
         self._folder, self._earlier, self._sources = folder, earlier, sources
 
     @cached_property
@@ -357,9 +357,9 @@ class SentPictures:
         return {digest_of_file(path): path for path in paths}
 
     def name(self, digest: str) -> str | None:
-        """Return the address of a picture from the page; None where it is not kept.
+        """Return the address of a picture from the page, or None if it is not kept.
 
-        Raises OSError where the disk refuses.
+        Raises OSError if the disk fails.
         """
         name = f"{digest[:_DIGITS]}.png"
         path = self._folder / name
@@ -392,7 +392,7 @@ def card_png(title: str, text: str, picture: Image.Image | None) -> bytes:
 
 
 def asset(name: str) -> bytes:
-    """Return the content of a file that pages are made of."""
+    """Return the content of a bundled file of pages."""
     return (files("phyblock.web") / "assets" / name).read_bytes()
 
 
@@ -407,10 +407,10 @@ def write_page(
 ) -> Path:
     """Write a page `name` and its data in the folder `below`/`build`/; return the page.
 
-    `make` writes the data into a folder that it is given and returns what the page shows: `title`,
+    `make` writes the data into the given folder and returns the content of the page: `title`,
     `description`, the address of an `image` for links to it ("" for none) and the `board`. The page
-    is written last and whole; data of earlier builds go, but for those `lasting`. An earlier page
-    that is still open says that it was written again.
+    is written last and atomically; data of earlier builds are removed, except the `lasting` ones.
+    An earlier page that is still open says that it was written again.
     """
     own = f"{below}{build}/"
     environment = jinja2.Environment(
@@ -418,7 +418,7 @@ def write_page(
     )
     script = "\n".join(asset(one).decode() for one in _SCRIPTS)
     style, icon = asset("style.css").decode(), base64.b64encode(asset("icon.svg")).decode()
-    # Only our own scripts may run, and every text is escaped.
+    # Only phyblock's scripts may run, and every text is escaped.
     digests = (
         base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
         for text in (script, style)

@@ -29,7 +29,7 @@ _MOST_NAMED = 6
 
 
 def cautions(run: Run) -> tuple[str, ...]:
-    """Return what a reader must know before any number, the gravest first; () for a whole run."""
+    """Return warnings to read before any number, most important first; () for a complete run."""
     table, stopped, told = coverage_frame(run), read_stopped(run.path), []
     expected, recorded = int(table["expected"].sum()), int(table["recorded"].sum())
     if recorded < expected:
@@ -60,11 +60,11 @@ def cautions(run: Run) -> tuple[str, ...]:
 def write_report(written: TablesWritten, data: Path | None = None) -> Path:
     """Write `report.html` and `report/` of a run whose tables were written; return the page.
 
-    The page draws goals, candidates and assemblies from the scenes: `data` is where the data set is
-    now, if it has moved; where it cannot be read, the page says so and shows the rest. Pictures
-    that were sent lie beside the page as far as the picture cache has them. Raises DataError for a
-    `data` that is not what the run was made on, StoreError where the folder cannot be written or
-    something is in the way that phyblock never wrote.
+    The page draws goals, candidates and assemblies from the scenes: `data` is the new place of the
+    data set, if it has moved; if it cannot be read, the page says so and shows the rest. Sent
+    pictures are put beside the page if the picture cache has them. Raises DataError for `data`
+    other than the run's, StoreError if the folder cannot be written or a file of others would be
+    overwritten.
     """
     run = written.run
     one = SiteRun(str(run.path), run, open_sources(run, data))
@@ -89,24 +89,24 @@ def write_report(written: TablesWritten, data: Path | None = None) -> Path:
 
 
 def files_of(*, page: bool) -> tuple[str, ...]:
-    """Return what a run folder may get: tables, its end, and with `page` the page as well."""
+    """Return the files that a run folder may get: tables, summary, and with `page` the page."""
     return (*table_files(), SUMMARY, *(page_files() if page else ()))
 
 
 def page_files() -> tuple[str, ...]:
-    """Return the page and the folders beside it, by their names in a run folder."""
+    """Return the names of the page and the folders beside it in a run folder."""
     return (REPORT_FILE, _FOLDER, PICTURES)
 
 
 def report_files(folder: Path) -> dict[str, Path]:
-    """Return the report's page and what it loads, by their names below the run folder."""
+    """Return the report's page and the files it loads, by their names in the run folder."""
     below = sorted((folder / _FOLDER).rglob("*"))
     found = [folder / REPORT_FILE, *(path for path in below if path.is_file())]
     return {path.relative_to(folder).as_posix(): path for path in found if not path.is_symlink()}
 
 
 def _about(written: TablesWritten) -> dict[str, Any]:
-    """Return what a page says of one run beside its numbers: what it is, and all its tables."""
+    """Return the content of a page on one run besides its numbers: facts, and all its tables."""
     run = written.run
     manifest, design, coverage = run.manifest, run.design, coverage_frame(run)
     answered = int(coverage["recorded"].sum() - coverage[list(WITHOUT_REPLY)].sum().sum())
@@ -125,7 +125,7 @@ def _about(written: TablesWritten) -> dict[str, Any]:
     about = design.suite.description
     return {
         "title": design.suite.name or run.path.name,
-        # A suite that was cut short still speaks of all that is in it.
+        # The description of a limited suite is still about the whole suite.
         "about": f"The whole suite: {about}" if manifest.limit and about else about,
         "facts": [(name, text) for name, text in facts.items() if text],
         "cautions": cautions(run),

@@ -1,9 +1,9 @@
-"""The server of a session's page: on the loopback address alone, behind a token, for its own pages.
+"""The server of a session's page: only on the loopback address, behind a token, for its own pages.
 
-Names other than 127.0.0.1 and localhost are refused as hosts, so that no foreign name that is made
-to mean this machine gets in; what changes anything must come from a page of this address. It reads
-from memory and from files that were named to it, and writes nothing. A browser is started with an
-address that leads on once: what stands on a command line can be read by others on the machine.
+Hosts other than 127.0.0.1 and localhost are refused, so that foreign names that resolve to this
+machine have no access; changes must come from a page of this address. It reads from memory and from
+files that it was given, and writes nothing. A browser is started with an address that works once,
+since others on the machine can read command lines.
 """
 
 from __future__ import annotations
@@ -36,10 +36,10 @@ _PAGE = {
     "icon.svg": ("icon.svg", "image/svg+xml"),
     **{name: (name, "text/javascript") for name in ("dom.js", "picker.js", "play.js")},
 }
-"""File and type of what the page is made of, by its name below the address."""
+"""Files of the page and their types, by their names below the address."""
 HOST = "127.0.0.1"
 LARGEST_BODY_BYTES = 16 * 1024
-"""Of a request; an answer is some hundred bytes long."""
+"""Limit of a request; an answer has a few hundred bytes."""
 _WAIT_S = 15.0
 _POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; "
@@ -63,14 +63,14 @@ _PICTURE = re.compile(r"picture/(\d{1,9})/(\d{1,3})")
 class Server(ThreadingHTTPServer):
     """A server of one session until it is closed; a context manager.
 
-    `address` is what a browser opens, with a token that nobody can guess; `one_time_address` leads
-    on to it when it is opened first, and never again. `files` are served too, by their names below
-    the address. `finished` is set by the page when the person is through. Raises SpecError for a
-    port that is taken.
+    `address` is for a browser, with a token that nobody can guess; `one_time_address` redirects to
+    it the first time it is opened, and never again. `files` are also served, by their names below
+    the address. The page sets `finished` when the person is done. Raises SpecError for a port that
+    is taken.
     """
 
     daemon_threads = True
-    # The same command goes on at the same port at once; on Windows two could then share one.
+    # The same command can reuse the port at once; on Windows, two servers could then share one.
     allow_reuse_address = os.name == "posix"
 
     def __init__(self, session: PlaySession, port: int = 0) -> None:
@@ -96,18 +96,18 @@ class Server(ThreadingHTTPServer):
         self.server_close()
 
     def server_bind(self) -> None:
-        """Bind without asking the network for the machine's name, which may take long."""
+        """Bind without a lookup of the machine's name, which may take long."""
         TCPServer.server_bind(self)
         self.server_name, self.server_port = self.server_address[:2]  # type: ignore[assignment]
 
     def handle_error(self, request: Any, client_address: Any) -> None:
-        """Say nothing of a page that was closed or reloaded while it was answered."""
+        """Ignore a page that was closed or reloaded during an answer."""
         if not isinstance(sys.exc_info()[1], ConnectionError):
             super().handle_error(request, client_address)
 
 
 class _Answer(BaseModel):
-    """An answer as the page sends it: picks, and the numbers of each where they have some."""
+    """An answer from the page: picks, and the numbers of each if they have some."""
 
     model_config = ConfigDict(strict=True)
     change: int
@@ -123,7 +123,7 @@ class _Handler(BaseHTTPRequestHandler):
     sys_version = ""
 
     def do_GET(self) -> None:
-        """Give a file of the page, the state, a picture, or a file that was named."""
+        """Send a file of the page, the state, a picture, or one of `files`."""
         if (asked := self._admitted(changes=False)) is None:
             return
         (name, query), session, files = asked, self.server.session, self.server.files
@@ -141,13 +141,13 @@ class _Handler(BaseHTTPRequestHandler):
             self._send(200, "image/png", drawn)
         elif name in files:
             kind = mimetypes.guess_type(name)[0] or "application/octet-stream"
-            # These bring a policy of their own.
+            # These have their own policy.
             self._send(200, kind, files[name].read_bytes(), "frame-ancestors 'none'")
         else:
             self._refuse(404)
 
     def do_POST(self) -> None:
-        """Take an answer, a pause, a beginning, an end."""
+        """Receive an answer, a pause, a beginning or an end."""
         if (asked := self._admitted(changes=True)) is None:
             return
         length, session = self.headers.get("Content-Length", ""), self.server.session
@@ -179,7 +179,7 @@ class _Handler(BaseHTTPRequestHandler):
                 self._send(200, "application/json", b"{}")
 
     def _admitted(self, *, changes: bool) -> tuple[str, str] | None:
-        """Return the name that is asked for and its query; None where the request was refused."""
+        """Return the requested name and its query, or None if the request was refused."""
         try:
             split = urlsplit(self.path)
         except ValueError:
@@ -192,7 +192,7 @@ class _Handler(BaseHTTPRequestHandler):
             *map(str.encode, (self.server.page, self.server.once)),
         )
         if split.netloc:
-            # A whole address is for proxies, and Pythons differ in which hosts they take.
+            # Full addresses are for proxies, and Python versions differ in which hosts they accept.
             self._refuse(404)
         elif len(hosts) != 1 or hosts[0] not in self.server.hosts:
             self._refuse(421)
@@ -232,8 +232,8 @@ class _Handler(BaseHTTPRequestHandler):
         self.wfile.write(content)
 
     def send_error(self, code: int, *_: object, **__: object) -> None:
-        """Refuse what is no request at all as everything else, with nothing of it repeated."""
+        """Refuse a malformed request like any other, without repeating any of it."""
         self._refuse(code)
 
     def log_message(self, *_: object) -> None:
-        """Say nothing: the terminal is the run's."""
+        """Log nothing: the terminal belongs to the run."""

@@ -1,8 +1,8 @@
-"""A human baseline: a person answers a suite at a page, with the pictures, prompts, records and
+"""A human baseline: a person answers a suite on a page, with the pictures, prompts, records and
 scores of a model.
 
-The run asks in its loop and waits; the server's threads read the question on show, and take an
-answer. No question is shown before the answer to the last one is on disk, as the run sees to.
+The run asks in its event loop and waits; the server's threads read the current question, and accept
+an answer. The run shows no question before the last answer is on disk.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ Phase = Literal["start", "warmed", "waiting", "question", "paused", "done", "clo
 
 @dataclass(frozen=True)
 class Person:
-    """A person who answers, by a short name; one who `is_exact` reads the prompt of models, as
-    studies may want. Raises SpecError for a name with other characters than stated.
+    """A person who answers, with a short name. If `is_exact`, the page shows the exact prompt of
+    models, for studies. Raises SpecError for a name with other characters than allowed.
     """
 
     name: str
@@ -53,15 +53,15 @@ class Person:
 
     @property
     def model(self) -> str:
-        """The name in records and tables."""
+        """Their name in records and tables."""
         return f"{HUMAN}{self.name}"
 
 
 def plan_session(suite: Suite, person: Person, limit: int | None) -> RunPlan:
-    """Plan the run of one person: a suite asked once, with its first seed.
+    """Return the plan of one person's run: a suite asked once, with its first seed.
 
-    Raises SpecError for a suite that asks in several ways or what nobody can answer by hand, and
-    what `make_plan` raises.
+    Raises SpecError for a suite with `vary` or tracks that nobody can answer by hand, and the
+    errors of `make_plan`.
     """
     if suite.vary.factors:
         message, hint = "asks in several ways, and a person is asked once", "take `vary` out"
@@ -75,10 +75,10 @@ def plan_session(suite: Suite, person: Person, limit: int | None) -> RunPlan:
 
 
 class PersonModel:
-    """A model that answers a request with the reply that a person's picks make at a page.
+    """A model that answers a request with the reply from a person's picks on a page.
 
-    Before the first plan that is asked for in one reply, the person may try the page on a scene of
-    level 1 that the run leaves out, where there is one; nothing of it is kept.
+    Before the first plan, the person may try the page on a scene of level 1 that is not in the run,
+    if there is one; nothing of it is kept.
     """
 
     needs_messages = True
@@ -93,7 +93,7 @@ class PersonModel:
             self._spare = next((task for task in left if 1 in task.scene.levels), None)
 
     async def ask(self, request: Request) -> Reply:
-        """Return the reply, in the form that the prompt asks for; HaltedError after the end."""
+        """Return the reply in the form of the prompt. Raises HaltedError after the end."""
         if self._spare is not None and not self._session.done:
             item, self._spare = self._spare, None
             await self._warm_up(item)
@@ -113,7 +113,7 @@ class PersonModel:
         assert by_hand is not None, "a plan has only tracks that can be answered by hand"
         picking = by_hand(request.subject)
         if self._plan.suite.images.source != "render":
-            # Nothing tells how grids are cut in pictures that a data set brings.
+            # The grids in a data set's own pictures are unknown.
             picking = picking.without_cells()
         text, took_s = await self._session.ask(request, picking, is_warm_up=is_warm_up)
         return Reply(
@@ -138,10 +138,10 @@ def pictures_of(request: Request) -> tuple[Image, ...]:
 def shown(
     request: Request, picking: Picking, place: Mapping[str, int], addresses: Sequence[str]
 ) -> dict[str, Any]:
-    """Return a question as the page takes it: the messages that a model is sent, and the choices.
+    """Return a question as data of the page: the messages for a model, and the choices.
 
-    Nothing else of an item is in it: no name, no scene, no answer. `place` is the number of the
-    item (0: a warm-up), of how many, and the turn there; `addresses` are those of its pictures.
+    It contains nothing else of an item: no name, no scene, no answer. `place` is the number of the
+    item (0: a warm-up), the number of items, and the turn; `addresses` are those of its pictures.
     """
     pictures, left = pictures_of(request), iter(addresses)
     last = {picture.label: (n, picture) for n, picture in enumerate(pictures)}
@@ -154,7 +154,7 @@ def shown(
 
     choices = []
     for choice in picking.choices:
-        # The picture's number, and shares of its sides.
+        # The number of the picture, and shares of its sides.
         seen = [last[label] for label in choice.labels if label in last]
         spots = [
             {"picture": n, "box": choice.box(picture.width_px, picture.height_px)}
@@ -174,12 +174,12 @@ def shown(
 
 
 class NotNowError(Exception):
-    """The page sent what is not waited for: another page was faster, or no question is shown."""
+    """The page sent something unexpected: another page was faster, or no question is shown."""
 
 
 @dataclass
 class _Asked:
-    """A question that waits for its answer, and for how long it was on show [s]."""
+    """A pending question, and how long it was shown [s]."""
 
     request: Request
     picking: Picking
@@ -189,12 +189,12 @@ class _Asked:
     since_s: float | None = None
 
     def seen_s(self, now_s: float) -> float:
-        """Return the time that the question was on show."""
+        """Return how long the question was shown."""
         return self.before_s + (0.0 if self.since_s is None else now_s - self.since_s)
 
 
 class PlaySession:
-    """One question at a time; every change has a number, by which a page asks for the next."""
+    """One question at a time; every change has a number, with which a page requests the next."""
 
     def __init__(self, of: int, clock: Callable[[], float] = time.monotonic) -> None:
         self._of, self.done, self._turns = of, 0, 0
@@ -210,9 +210,9 @@ class PlaySession:
     async def run(
         self, plan: RunPlan, person: Person, folder: Path, opened: Callable[[], None]
     ) -> RunResult:
-        """Ask what is left; a signal closes the session, and what was answered is written.
+        """Ask the remaining samples; a signal closes the session, and all answers are written.
 
-        `opened` is called when the page can be shown. Raises what the run meets.
+        `opened` is called when the page can be shown. Raises the errors of the run.
         """
 
         self._is_exact = person.is_exact
@@ -249,12 +249,12 @@ class PlaySession:
     async def ask(
         self, request: Request, picking: Picking, *, is_warm_up: bool = False
     ) -> tuple[str, float]:
-        """Return the reply that the person's picks make, and how long they took [s].
+        """Return the reply from the person's picks, and how long they took [s].
 
-        Raises HaltedError where the session is closed first.
+        Raises HaltedError if the session is closed first.
         """
         answer: Future[tuple[str, float]] = Future()
-        # From now on it can be settled, whoever has stopped waiting.
+        # From now on it can be settled, even if nobody waits any more.
         answer.set_running_or_notify_cancel()
         with self._changed:
             if self._phase == "closed":
@@ -268,13 +268,13 @@ class PlaySession:
         return await asyncio.wrap_future(answer)
 
     def state(self, after: int, wait_s: float = 0.0) -> dict[str, Any]:
-        """Return what a page shows; wait for a change after number `after`, this long at most."""
+        """Return the state for a page; wait for a change after number `after`, up to `wait_s`."""
         with self._changed:
             self._changed.wait_for(lambda: self._number != after, wait_s)
             told: dict[str, Any] = {"change": self._number, "phase": self._phase, **self._told}
             if self._asked is not None and self._phase == "question":
                 asked, now_s = self._asked, self._clock()
-                # The clock starts when the question is first given out.
+                # The clock starts when the question is first sent.
                 asked.since_s = now_s if asked.since_s is None else asked.since_s
                 count = len(pictures_of(asked.request))
                 addresses = [f"picture/{self._number}/{n}" for n in range(count)]
@@ -283,7 +283,7 @@ class PlaySession:
             return told
 
     def picture(self, change: int, number: int) -> Image | None:
-        """Return a picture of the question that is shown; None for any other."""
+        """Return a picture of the current question; None for any other."""
         with self._changed:
             if self._asked is None or self._phase != "question" or change != self._number:
                 return None
@@ -291,16 +291,16 @@ class PlaySession:
             return pictures[number] if 0 <= number < len(pictures) else None
 
     def drawn(self, name: str) -> bytes | None:
-        """Return a picture of the end by its name; None for any other, and before the end."""
+        """Return a picture of the final page by name; None for any other, and before the end."""
         return None if self._ending is None else self._ending.picture(name)
 
     def welcome(self, name: str) -> None:
-        """Say what comes, to a person of this name."""
+        """Show the introduction to a person of this name."""
         with self._changed:
             self._go_to("start", about={"name": name, "done": self.done, "of": self._of})
 
     def warmed(self, went: Mapping[str, Any]) -> None:
-        """Show how the warm-up went."""
+        """Show the result of the warm-up."""
         with self._changed:
             self._go_to("warmed", went=went)
 
@@ -312,10 +312,9 @@ class PlaySession:
             self._go_to("waiting" if self._asked is None else "question")
 
     def answer(self, change: int, picks: Sequence[Pick]) -> None:
-        """Take the answer to the question that was shown under a number.
+        """Accept the answer to the question with this change number.
 
-        Raises NotNowError for another question than the one on show, ValueError for picks that make
-        no answer.
+        Raises NotNowError if it is not the current one, ValueError for picks that make no answer.
         """
         with self._changed:
             asked = self._on_show(change)
@@ -332,13 +331,13 @@ class PlaySession:
             self._go_to("paused")
 
     def finish(self, ending: Ending) -> None:
-        """Show how it went: the session is over."""
+        """Show the results: the session is over."""
         with self._changed:
             self._ending = ending
             self._go_to("done", results=ending.shown)
 
     def close(self) -> None:
-        """Take nothing more; a question on show is given up."""
+        """Accept nothing more; the current question is given up."""
         with self._changed:
             asked, self._asked = self._asked, None
             self._go_to("closed")
