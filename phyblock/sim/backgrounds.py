@@ -171,9 +171,6 @@ def add_background(name: str, ground: Ground) -> None:
     BACKGROUNDS.append(cast(Background, name))
 
 
-TEXTURED: tuple[Background, ...] = tuple(name for name, one in GROUNDS.items() if one.texture)
-
-
 def floor(background: Background, camera: Camera, size_px: int) -> NDArray[np.float32]:
     """Color of every pixel's floor, shape (size, size, 3), 0..255, before any shadow."""
     if (paint := GROUNDS[background].paint) is not None:

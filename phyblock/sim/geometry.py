@@ -247,7 +247,6 @@ def _one_of_each_line(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 _CM = 100.0
-UPRIGHT: Euler = (0.0, 0.0, 0.0)
 
 
 def center_cm(block: Block) -> tuple[float, float, float]:

@@ -23,7 +23,7 @@ from PIL import Image, ImageDraw, ImageFont
 from phyblock.domain.blocks import SHAPES, BlockType, Color, Euler, euler_deg_to_matrix
 from phyblock.domain.scene import Block, CandidateSet, Scene
 from phyblock.errors import DataError, Problem
-from phyblock.sim.backgrounds import DARK_INK, GROUNDS, INK_RGB, LIGHT_INK, TEXTURED, floor, shadow
+from phyblock.sim.backgrounds import DARK_INK, GROUNDS, INK_RGB, LIGHT_INK, floor, shadow
 from phyblock.sim.camera import VIEWS, Camera, Window, frame, view_axes
 from phyblock.sim.engine import Pose
 from phyblock.sim.geometry import dot, drawn_mesh, rounded, turned
@@ -355,11 +355,11 @@ def _write_number(cell: Image.Image, number: int, background: Background) -> Non
     side = cell.height
     font = ImageFont.load_default(size=_LABEL_SIZE * side)
     place = (side * (1 - _LABEL_MARGIN), side * (1 - _LABEL_MARGIN))
-    ink = GROUNDS[background].ink
-    rim = DARK_INK if ink == LIGHT_INK else LIGHT_INK
-    width = round(side * _RIM) if background in TEXTURED else 0
+    ground = GROUNDS[background]
+    rim = DARK_INK if ground.ink == LIGHT_INK else LIGHT_INK
+    width = round(side * _RIM) if ground.texture else 0
     pen = ImageDraw.Draw(cell)
-    pen.text(place, str(number), ink, font, "rs", stroke_width=width, stroke_fill=rim)
+    pen.text(place, str(number), ground.ink, font, "rs", stroke_width=width, stroke_fill=rim)
 
 
 @functools.lru_cache(maxsize=512)

@@ -26,7 +26,7 @@ from phyblock.errors import DataError
 from phyblock.making.scenes.candidates import make_candidates
 from phyblock.making.scenes.sketch import POSES
 from phyblock.sim import ruled
-from phyblock.sim.backgrounds import TEXTURED
+from phyblock.sim.backgrounds import GROUNDS
 from phyblock.sim.camera import VIEWS, Camera, Window, frame, view_axes
 from phyblock.sim.engine import Pose, quat_xyzw_to_euler_deg
 from phyblock.sim.film import FilmStep, assembly_gif, episode_gif, episode_images
@@ -83,7 +83,8 @@ windows = st.builds(
     Window, st.floats(-1, -0.2), st.floats(0.1, 1), st.floats(-1, -0.3), st.floats(0.2, 1)
 )
 slowly = [
-    pytest.param(name, marks=pytest.mark.slow if name in TEXTURED else ()) for name in BACKGROUNDS
+    pytest.param(name, marks=pytest.mark.slow if GROUNDS[name].texture else ())
+    for name in BACKGROUNDS
 ]
 
 

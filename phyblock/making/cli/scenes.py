@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import chain
+from operator import call
 from pathlib import Path
 from typing import cast
 
@@ -360,12 +361,10 @@ def audit(data: str, table: Path | None, jobs: int) -> None:
     every = [*twins, *chain.from_iterable(findings)]
     console = make_console()
 
-    def badness(scene: Scene) -> tuple[bool, bool, float, int]:
-        # What falls, then the largest overlap or gap, then the number of findings.
+    def badness(scene: Scene) -> tuple[float, int]:
+        """The farthest fall, or the largest overlap or gap, then the number of findings."""
         some = found[scene.id]
-        checks = {finding.check for finding in some}
-        fit = [f.value_mm or 0.0 for f in some if f.check in ("overlap", "floating")]
-        return "unstable" in checks, "unstable step" in checks, max(fit, default=0.0), len(some)
+        return max(finding.value_mm or 0.0 for finding in some), len(some)
 
     rows: list[tuple[str, ...]] = []
     guilty = [scene for scene in scenes if found[scene.id]]
@@ -495,7 +494,7 @@ def render(
     work = f"scenes render: {read.sha256} {hex_digest(repr([RENDER_VERSION, *drawings]))}\n"
     shards = open_shards(shard, out, work)
     with open_workers(jobs, ray_address, shards) as workers:
-        drawn = workers.map(_drawn, drawings.values())
+        drawn = workers.map(call, drawings.values())
         drawn = tracked(drawn, len(drawings), "Drawing", "pictures")
         for name, picture in zip(drawings, drawn, strict=True):
             if shards is None or shards.writes:
@@ -503,10 +502,6 @@ def render(
     if left_to_first(shards, out):
         return
     click.echo(f"{counted(len(drawings), 'file')} in {shown_path(out)}")
-
-
-def _drawn(drawing: Callable[[], bytes]) -> bytes:
-    return drawing()
 
 
 def _composite(task: AssemblyTask, style: PictureStyle) -> bytes:

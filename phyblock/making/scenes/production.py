@@ -251,7 +251,7 @@ class Production:
         self._seed, self._palette, self._workers = seed, palette, workers
         self._excluded, self.rejected = excluded, 0
         self._seen: set[bytes] = set()
-        self._bases: dict[Group, list[tuple[str, Request]]] = {g: [] for g in GROUP_LEVELS}
+        self._bases: dict[Request, str] = {}
         self._next: Counter[Group] = Counter()
         self._named: Counter[int] = Counter()
         self._width = 3
@@ -274,7 +274,7 @@ class Production:
         for made, scene in self._accepted(wanted, request, self._next[group]):
             taken, self._next[group] = taken + 1, made.number + 1
             name = self._name(scene)
-            self._bases[group].append((name, made))
+            self._bases[made] = name
             yield replace(scene, id=name, parents=(name,))
         if taken < wanted:
             message = f"gave no more than {taken} new scenes of {wanted}"
@@ -283,24 +283,23 @@ class Production:
 
     def variations(self, group: Group, wanted: int) -> Iterator[Scene]:
         """Variations, and base scenes for what is missing where there are too few to vary."""
-        named = [
-            (count, [b for g in groups for b in self._bases[g]])
-            for count, groups in _SOURCES[group]
-        ]
-        sources = [(count, bases) for count, bases in named if len(bases) >= count]
-        name_of = {request: name for bases in self._bases.values() for name, request in bases}
+        sources = []
+        for count, groups in _SOURCES[group]:
+            bases = [base for one in groups for base in self._bases if base.group == one]
+            if len(bases) >= count:
+                sources.append((count, bases))
 
         def request(number: int) -> Request:
             rng = np.random.default_rng(list(f"{self._seed}/{group}/parents/{number}".encode()))
             count, bases = sources[int(rng.integers(len(sources)))]
             chosen = rng.choice(len(bases), size=count, replace=False)
-            parents = tuple(bases[int(i)][1] for i in chosen)
+            parents = tuple(bases[int(i)] for i in chosen)
             return Request(self._seed, self._palette, group, number, parents)
 
         taken = 0
         for made, scene in self._accepted(wanted, request, 0) if sources else ():
             taken += 1
-            names = tuple(dict.fromkeys(name_of[parent] for parent in made.parents))
+            names = tuple(dict.fromkeys(self._bases[parent] for parent in made.parents))
             yield replace(scene, id=self._name(scene), parents=names)
         yield from self.bases(group, wanted - taken)
 
@@ -309,27 +308,29 @@ class Production:
     ) -> Iterator[tuple[Request, Scene]]:
         """The first `wanted` candidates that are sound and new, in the order of their numbers."""
         number, taken, last = first, 0, first
+        is_sound = partial(is_acceptable, palette=PALETTES[self._palette])
         while taken < wanted and number - last <= _PATIENCE:
             size = min(_LARGEST_ROUND, max(8, math.ceil((wanted - taken) * 1.3)))
             requests = [request(number + i) for i in range(size)]
             number += size
-            for made, scene in self._sound(requests):
-                taken, last = taken + 1, made.number
-                yield made, scene
-                if taken == wanted:
-                    return
+            drawn = filter(None, self._workers.map(_drawn, requests))
+            fresh = [one for one in drawn if self._is_new(one)]
+            sound = self._workers.map(is_sound, [one.scene for one in fresh])
+            for one, is_kept in zip(fresh, sound, strict=True):
+                if is_kept:
+                    taken, last = taken + 1, one.request.number
+                    yield one.request, one.scene
+                    if taken == wanted:
+                        return
 
-    def _sound(self, requests: list[Request]) -> Iterator[tuple[Request, Scene]]:
-        fresh: list[tuple[Request, Scene]] = []
-        for one in filter(None, self._workers.map(_drawn, requests)):
-            if one.colorless in self._excluded:
-                self.rejected += 1
-            elif one.form not in self._seen:
-                self._seen.add(one.form)
-                fresh.append((one.request, one.scene))
-        is_sound = partial(is_acceptable, palette=PALETTES[self._palette])
-        sound = self._workers.map(is_sound, [scene for _, scene in fresh])
-        return (one for one, is_kept in zip(fresh, sound, strict=True) if is_kept)
+    def _is_new(self, one: Drawn) -> bool:
+        """True if a form is neither excluded, which is counted, nor seen before."""
+        if one.colorless in self._excluded:
+            self.rejected += 1
+            return False
+        is_new = one.form not in self._seen
+        self._seen.add(one.form)
+        return is_new
 
     def _name(self, scene: Scene) -> str:
         level = scene.levels[0]
