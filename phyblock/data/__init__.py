@@ -1,1 +1,1 @@
-"""Readers of data: scenes and questions in our own format and in the official layout."""
+"""Readers of data: scenes and questions in phyblock's own format and in the official layout."""

@@ -1,7 +1,7 @@
-"""Data sets as every reader returns them, and their files read without trust.
+"""Data sets, and functions that read untrusted files.
 
-What is wrong in a file is raised as DataError with its place, and all of it at once. No file may
-hang the program or exhaust its memory.
+All problems of a file are raised at once, as one DataError with their places. No file may hang the
+program or exhaust its memory.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ from phyblock.text import did_you_mean, hex_digest, some_of
 
 VERSION_FILE = "VERSION"
 UNNUMBERED = 1
-"""Version of a set without such a file: ours had none in their first version."""
+"""Version of a set without a version file: the first bundled sets had none."""
 _LARGEST_BYTES = 1024**3
 _MOST_OF_ALL = 1000
-"""Faults of a data set that are reported."""
+"""Maximum number of reported faults of a data set."""
 _T = TypeVar("_T")
 
 
 @dataclass(frozen=True)
 class Dataset:
-    """Assembly tasks in scene-id order; `root` is where they were read from."""
+    """Assembly tasks in scene-id order; `root` is the folder that they were read from."""
 
     name: str
     root: Path
@@ -42,7 +42,7 @@ class Dataset:
 
     @functools.cached_property
     def sha256(self) -> str:
-        """Hex digest of the scenes and candidate sets, whatever the format they came in."""
+        """Hex digest of the scenes and candidate sets, independent of their format."""
         return _digest([[task.scene, task.candidates] for task in self.tasks])
 
     @functools.cached_property
@@ -50,7 +50,7 @@ class Dataset:
         return {task.key: task for task in self.tasks}
 
     def task(self, scene: str) -> AssemblyTask:
-        """Return the task of a scene; DataError where there is none."""
+        """Return the task of a scene. Raises DataError if there is none."""
         if scene in self._by_scene:
             return self._by_scene[scene]
         allowed, hint = some_of(list(self._by_scene)), did_you_mean(scene, self._by_scene)
@@ -60,7 +60,7 @@ class Dataset:
 
 @dataclass(frozen=True)
 class QuestionTask:
-    """A question; `files` are pictures by label that the data set brings, instead of recipes."""
+    """A question; `files` are pictures of the data set by label, used instead of recipes."""
 
     question: Question
     files: Mapping[str, Path] = field(default_factory=dict)
@@ -72,7 +72,7 @@ class QuestionTask:
 
     @property
     def scene(self) -> Scene:
-        """The scene as the question shows it."""
+        """The scene as shown in the question."""
         return self.question.scene
 
 
@@ -101,13 +101,13 @@ def _digests(files: Mapping[str, Path]) -> dict[str, str]:
 
 
 def _digest(content: object) -> str:
-    # `asdict` would copy all that is in a dataclass as well.
+    # `asdict` would also copy everything inside.
     plain = lambda one: {each.name: getattr(one, each.name) for each in fields(one)}  # noqa: E731
     return hex_digest(json.dumps(content, sort_keys=True, default=plain))
 
 
 def read_version(folder: Path) -> int:
-    """Return the version of the data set in a folder; DataError where its file holds none."""
+    """Return the version of the data set in a folder. Raises DataError for a bad version file."""
     path = folder / VERSION_FILE
     if not path.exists():
         return UNNUMBERED
@@ -119,7 +119,7 @@ def read_version(folder: Path) -> int:
 
 
 def read_data(path: Path, allowed: str = "") -> bytes:
-    """Return the bytes of a file; DataError when it cannot be read or is too large."""
+    """Return the bytes of a file. Raises DataError if it cannot be read or is too large."""
     try:
         return read_bytes(path, _LARGEST_BYTES)
     except (OSError, ValueError) as error:
@@ -128,12 +128,12 @@ def read_data(path: Path, allowed: str = "") -> bytes:
 
 
 def read_set(path: Path) -> bytes:
-    """Return the bytes of the file of lines of a data set; DataError as `read_data`."""
+    """Return the bytes of a data set's file of lines; raises as `read_data`."""
     return read_data(path, f"a folder with {path.name}, or the name of a bundled set")
 
 
 def report(faults: Iterable[Fault], where: str) -> None:
-    """Raise DataError with these faults of what stands at a place, if there are any."""
+    """Raise DataError with these faults of the value at a place, if there are any."""
     if problems := [
         Problem(where, f.message, dotted(f.at), f.found or "", f.allowed) for f in faults
     ]:
@@ -143,7 +143,7 @@ def report(faults: Iterable[Fault], where: str) -> None:
 def read_each(
     entries: Iterable[tuple[str, Callable[[], _T]]], name: Callable[[_T], str]
 ) -> list[_T]:
-    """Return what is read at each place; DataError with all that cannot, and names used twice.
+    """Return the values read at each place. Raises DataError with all faults and duplicate names.
 
     Reading stops after a thousand faults.
     """
@@ -175,10 +175,10 @@ def read_lines(
     read: Callable[[bytes, str], _T],
     name: Callable[[_T], str],
 ) -> list[_T]:
-    """Return what `read` makes of every line of the content of a file, and its place.
+    """Return the result of `read` for every line of a file's content and its place.
 
-    Raises DataError with everything that is wrong: what `read` raises, a name that stands twice, a
-    file of no `noun`.
+    Raises DataError with all problems: errors of `read`, duplicate names, a file without any
+    `noun`.
     """
     data = content.removesuffix(b"\n")
     if b"\0" in data or not data:

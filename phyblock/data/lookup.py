@@ -1,4 +1,4 @@
-"""Data sets by the name that a person gives: a folder, a file in it, or a set of phyblock's own."""
+"""Lookup of data sets by name: a folder, a file in it, or a bundled set."""
 
 import os
 from pathlib import Path
@@ -12,9 +12,9 @@ from phyblock.files import bundled, bundled_sets
 
 
 def find_data_set(name: str) -> Path:
-    """Return the folder that `name` means: a data set, an official checkout, or a bundled set.
+    """Return the folder of `name`: a data set, an official checkout, or a bundled set.
 
-    Raises DataError that lists the bundled sets when there is no such folder.
+    Raises DataError, listing the bundled sets, if there is no such folder.
     """
     path = Path(name)
     if os.path.lexists(path / SCENES_FILE) or (path / "data").is_dir():
@@ -23,27 +23,27 @@ def find_data_set(name: str) -> Path:
 
 
 def read_data_set(name: str) -> Dataset:
-    """Return the data set that `name` means; DataError with everything that is wrong in it."""
+    """Return the data set of `name`. Raises DataError with all its problems."""
     folder = find_data_set(name)
     return open_dataset("builtin" if os.path.lexists(folder / SCENES_FILE) else "official", folder)
 
 
 def open_dataset(layout: str, folder: Path) -> Dataset:
-    """Return the data set in a folder, "builtin" or "official"; DataError where it is broken."""
+    """Return the "builtin" or "official" data set in a folder. Raises DataError if it is broken."""
     return read_official(folder) if layout == "official" else read_builtin(folder)
 
 
 def find_questions(name: str) -> Path:
-    """Return the folder that `name` means: one with questions, or a bundled set.
+    """Return the folder of `name`: one with questions, or a bundled set.
 
-    Raises DataError that lists the bundled sets when there is no such folder.
+    Raises DataError, listing the bundled sets, if there is no such folder.
     """
     path = Path(name)
     return path if path.is_dir() else _file_or_bundled(path, QUESTIONS_FILE, "set of questions")
 
 
 def _file_or_bundled(path: Path, file: str, noun: str, more: str = "") -> Path:
-    """Return the folder of a data file that is named itself, or of a bundled set."""
+    """Return the folder of a data file, given by its own path, its folder or a bundled name."""
     if path.name == file and os.path.lexists(path):
         return path.parent
     inside = bundled("benchmarks", "data", *path.parts)

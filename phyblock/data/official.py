@@ -7,8 +7,8 @@
 
 No released file is labelled level 1; the paper's Level-1 columns score the level-2 scenes without
 order, so a level-2 scene is read as a scene of levels 1 and 2. Question files in the JSON form of
-the paper's appendix A.4 lie in a folder of their own; docs/vqa.md describes them. Names of models
-are matched to the rows of the paper's Tables 1 and 2.
+the paper's appendix A.4 are in a separate folder; docs/vqa.md describes them. Names of models are
+matched to the rows of the paper's Tables 1 and 2.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ _CandidateFile = Annotated[
 
 
 def read_official(root: Path) -> Dataset:
-    """Return all scenes of a checkout; DataError with all scenes in which something is wrong."""
+    """Return all scenes of a checkout. Raises DataError with the problems of all scenes."""
     goals = sorted((root / _GOALS).glob("*.json"))
     if not goals:
         allowed = f"a checkout of the official PhyBlock repository, with {_GOALS.as_posix()}/*.json"
@@ -125,7 +125,7 @@ def read_official(root: Path) -> Dataset:
 
 
 def read_candidates(path: Path) -> CandidateSet:
-    """Return the candidate set in a file; DataError with everything that is wrong in it."""
+    """Return the candidate set in a file. Raises DataError with all its problems."""
     return candidate_set(decode(TypeAdapter(_CandidateFile), read_data(path), str(path)))
 
 
@@ -141,11 +141,11 @@ def recorded_models(root: Path) -> dict[str, Path]:
 
 
 def official_prompt(root: Path) -> str:
-    """Return the exact official text prompt, read out of the recordings that carry it.
+    """Return the exact official text prompt, from the recordings that include it.
 
-    Those recordings show the goal picture and the candidate picture apart, before the text; the
-    marks that stood for the pictures are taken off. Where recordings differ, the prompt of most
-    models is taken. Raises DataError when no recording carries one, or when there is no most.
+    Those recordings have the goal picture and the candidate picture before the text; the markers of
+    the pictures are removed. If recordings differ, the prompt of the most models is used. Raises
+    DataError if no recording includes one, or none is the most frequent.
     """
     texts: Counter[str] = Counter()
     for folder in recorded_models(root).values():
@@ -176,7 +176,7 @@ class _Question(Line, extra="ignore"):
 
 
 def read_official_questions(folder: Path, scenes: Dataset) -> QuestionSet:
-    """Return all questions of a folder, about these scenes; DataError with all that is wrong."""
+    """Return all questions of a folder, about these scenes. Raises DataError with all problems."""
     files = sorted(folder.glob("*.json"))
     if not files:
         allowed = "question files such as SH.json, one a subtask"
@@ -249,7 +249,7 @@ _PUBLISHED = (
     "Qwen2.5-VL-7B-Instruct", "LLaVa-OneVision-0.5B", "LLaVa-OneVision-7B", "Random", "GPT-4.1",
     "GPT-o3", "Qwen2.5-VL-72B-Instruct",
 )  # fmt: skip
-"""Rows of the paper's Table 1, then those that Table 2 has beside them."""
+"""Rows of the paper's Table 1, then those only in Table 2."""
 _SPELLINGS = {
     "claude-3-7": "Claude-3.7 Sonnet",
     "claude-3-7-thinking": "Claude-3.7 Sonnet-Thinking",
@@ -273,11 +273,11 @@ _RELEASE = re.compile(r"(?<=[-_./ @])(?:latest|00[0-9])$")
 
 
 def match_published(name: str) -> str | None:
-    """Return the row of Table 1 or 2 that a folder of recordings or a model name stands for.
+    """Return the row of Table 1 or 2 for a folder of recordings or a model name.
 
-    Case, separators, release dates and folders before the last slash make no difference; else all
-    tokens (runs of letters and of digits) must be those of a known spelling. None where the name is
-    unknown or could mean more than one row: "claude-3-5" names two models, "gemini-2.0" four.
+    Case, separators, release dates and folders before the last slash are ignored; apart from that,
+    all tokens (runs of letters and of digits) must match a known spelling. None if the name is
+    unknown or ambiguous: "claude-3-5" matches two models, "gemini-2.0" four.
     """
     return _ROWS.get(_tokens(name))
 

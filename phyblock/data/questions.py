@@ -1,6 +1,6 @@
-"""`questions.jsonl`: a multiple-choice question about a scene a line; docs/vqa.md describes it.
+"""`questions.jsonl`: one multiple-choice question about a scene per line; see docs/vqa.md.
 
-Pictures are recipes: each says how it differs from the scene that the question names.
+Pictures are recipes: each describes its differences from the question's scene.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ QUESTIONS_FILE = "questions.jsonl"
 _MOST_OPTIONS = 26
 _MOST_PICTURES = 2 + len(LETTERS)
 _FEW = 20
-"""So many lines with faults are reported one by one."""
+"""Maximum number of faulty lines that are reported one by one."""
 _NO_SCENE = "names no scene of the data set"
 
 
@@ -53,9 +53,9 @@ class StoredPose(Line, extra="ignore"):
     """The pose of a block in a picture."""
 
     position: Position
-    """As of a block."""
+    """As for a block."""
     euler: Angles
-    """As of a block."""
+    """As for a block."""
 
 
 class StoredKind(Line, extra="ignore"):
@@ -71,12 +71,12 @@ class StoredMark(Line, extra="ignore"):
     """A lettered place."""
 
     letter: Literal["A", "B", "C", "D", "X"]
-    """A to D where the places are the options, X where the text speaks of one."""
+    """A to D if the places are the options, X if the text refers to one."""
     position: Position
     """Its place [m]."""
 
 
-# The blocks of several outcomes, so that all of their pictures are framed alike.
+# The blocks of several outcomes, so that all of their pictures have the same frame.
 _Framed = Annotated[tuple[StoredBlock, ...], Field(min_length=1, max_length=4 * MAX_BLOCKS)]
 
 
@@ -98,11 +98,11 @@ class StoredPicture(Line, extra="forbid"):
     marks: Annotated[tuple[StoredMark, ...], Field(min_length=1, max_length=MAX_BLOCKS)] = ()
     """Places."""
     framed: Literal[True] | _Framed = ()
-    """Blocks that the camera is framed on: true, the whole scene; left out: all that are drawn."""
+    """Blocks that the camera is framed on; true: the whole scene; missing: all drawn blocks."""
 
     @classmethod
     def of(cls, picture: QuestionPicture, scene: Scene) -> Self:
-        """Return a recipe as it is written."""
+        """Return the stored form of a recipe."""
         known = {block.order: block for block in scene.blocks}
         drawn = {block.order: block for block in picture.blocks}
         kept = [(known[order], block) for order, block in drawn.items() if order in known]
@@ -126,7 +126,7 @@ class StoredPicture(Line, extra="forbid"):
         return cls.model_validate({"label": picture.label, "view": picture.view_deg, **given})
 
     def picture(self, scene: Scene, background: Background | None) -> QuestionPicture:
-        """Return the picture that it makes of a scene."""
+        """Return the picture of a scene by this recipe."""
         kept = (block for block in scene.blocks if block.order not in self.without)
         added = (stored.block() for stored in self.add)
         azimuth, elevation, _ = triple((*self.view, 0.0))
@@ -150,7 +150,7 @@ class StoredPicture(Line, extra="forbid"):
         return block
 
     def faults(self, scene: Scene) -> Iterator[Fault]:
-        """Yield what is wrong with it as a picture of a scene."""
+        """Yield its faults as a picture of a scene."""
         orders = {str(block.order) for block in scene.blocks}
         yield from _unknown_orders(self.without, scene, "without")
         yield from _unknown_orders(self.poses, scene, "poses")
@@ -174,7 +174,7 @@ def _unknown_orders(orders: Iterable[object], scene: Scene, field: str) -> Itera
 def _option_faults(options: Sequence[str]) -> Iterator[Fault]:
     if len(options) != len(LETTERS):
         yield Fault("are not four", "four options", str(len(options)))
-    # Letter case and spaces do not tell options apart.
+    # Options must differ in more than letter case and spaces.
     read = [" ".join(option.lower().split()) for option in options]
     for i, option in enumerate(options):
         first = read.index(read[i])
@@ -198,13 +198,13 @@ class StoredQuestion(Line, extra="forbid"):
     id: Name
     """Unique in the file."""
     subtask: SubtaskName
-    """The letters of its subtask, as above."""
+    """The letters of its subtask."""
     category: Category | None = None
-    """The category of the paper that the subtask belongs to."""
+    """The paper's category of the subtask."""
     scene_id: str
-    """The scene in the data set that the questions are about."""
+    """The scene of the question."""
     wording: str = ""
-    """Id of the template that the text was filled from."""
+    """Id of the template of the text."""
     question: Text
     """The text."""
     options: Options
@@ -212,19 +212,19 @@ class StoredQuestion(Line, extra="forbid"):
     answer: str
     """`A` to `D`; for ordering all four letters in the right order, like `BADC`."""
     colors: dict[str, Color] = Field(default_factory=dict)
-    """Colors of blocks that are recolored, by order; left out where none is."""
+    """Colors of recolored blocks, by order; missing: none."""
     background: BackgroundName | None = None
-    """Background of all its pictures; missing where the run's own is drawn, as in older sets."""
+    """Background of all its pictures; missing: the run's own, as in older sets."""
     pictures: Annotated[tuple[StoredPicture, ...], Field(min_length=1, max_length=_MOST_PICTURES)]
     """Its pictures."""
     evidence: dict[str, Any] = Field(default_factory=dict)
     """Facts that the answer was derived from; `slots` are the words in the template."""
     format: Format = 1
-    """Version of the line, 1 where it does not say."""
+    """Version of the line; default 1."""
 
     @classmethod
     def of(cls, question: Question, original: Scene) -> Self:
-        """Return a question as it is written; `original` is the scene as stored."""
+        """Return the stored form of a question; `original` is the scene as stored."""
         pairs = zip(question.scene.blocks, original.blocks, strict=True)
         colors = {str(new.order): new.color for new, old in pairs if new.color != old.color}
         background = question.pictures[0].background if question.pictures else None
@@ -241,7 +241,7 @@ class StoredQuestion(Line, extra="forbid"):
         )
 
     def about(self, original: Scene) -> Question:
-        """Return the question that it asks about the scene that it names, given as stored."""
+        """Return the question about its scene, which is given as stored."""
         blocks = tuple(
             replace(block, color=self.colors.get(str(block.order), block.color))
             for block in original.blocks
@@ -260,7 +260,7 @@ class StoredQuestion(Line, extra="forbid"):
         )
 
     def faults(self, scene: Scene) -> Iterator[Fault]:
-        """Yield what is wrong with it as a question about a scene."""
+        """Yield its faults as a question about a scene."""
         if self.category not in (None, category_of(self.subtask)):
             yield _wrong("category", "is not known", category_of(self.subtask), self.category)
         is_order = self.subtask == "OR"
@@ -292,7 +292,7 @@ def _wrong(field: str, message: str, allowed: str, found: object) -> Fault:
 
 
 def scene_of(name: str, scenes: Mapping[str, Scene], where: str) -> Scene:
-    """Return the scene that a question names; DataError where the data set has none such."""
+    """Return the scene of a question. Raises DataError if the data set does not have it."""
     if name not in scenes:
         allowed = f"one of the {len(scenes)} scenes of the data set"
         report([_wrong("scene_id", _NO_SCENE, allowed, name)], where)
@@ -300,9 +300,9 @@ def scene_of(name: str, scenes: Mapping[str, Scene], where: str) -> Scene:
 
 
 def read_questions(folder: Path, scenes: Dataset) -> QuestionSet:
-    """Return all questions of a folder, about these scenes; DataError with all that is wrong.
+    """Return all questions of a folder, about these scenes. Raises DataError with all problems.
 
-    Where most are about scenes of another data set, that is what is wrong.
+    If most are about scenes of another data set, only that is reported.
     """
     known = {task.scene.id: task.scene for task in scenes.tasks}
 

@@ -1,7 +1,7 @@
-"""`scenes.jsonl`: a goal structure and its candidate set a line; see docs/data-format.md.
+"""`scenes.jsonl`: one goal structure and its candidate set per line; see docs/data-format.md.
 
-The types of single values and the checks of relations (orders, dependencies, layers, looks) serve
-every layout that is read.
+All layouts use the same types of single values and checks of relations (orders, dependencies,
+layers, looks).
 """
 
 from __future__ import annotations
@@ -39,11 +39,11 @@ Vector = tuple[float, float, float]
 
 
 def plain(number: float) -> float:
-    """Return a whole number as an integer, which reads better in a file."""
+    """Return a whole number as an integer, which is easier to read in a file."""
     return int(number) if float(number).is_integer() else number
 
 
-# Bounds are far above any use, and near enough to zero for geometry to be exact.
+# Bounds are far above any use, and small enough for exact geometry.
 _PLAIN = AfterValidator(plain)
 _Length = Annotated[float, Field(strict=True, ge=-100, le=100, allow_inf_nan=False)]
 _Meters = Annotated[_Length, _PLAIN]
@@ -56,7 +56,7 @@ Angles = tuple[_Degrees, _Degrees, _Degrees]
 View = tuple[_Degrees, _Elevation]
 """Azimuth and elevation of a camera [degrees]."""
 Format = Literal[1]
-"""Version of a line of data; a newer one may mean something else."""
+"""Version of a line of data; a newer one may have another meaning."""
 Order = Annotated[int, Field(strict=True, ge=1, le=9999)]
 """Number of a block or of a layer."""
 OrderOrGround = Annotated[int, Field(strict=True, ge=0, le=9999)]
@@ -86,7 +86,7 @@ class StoredBlock(Line, extra="ignore"):
     color: Color
     """Its color."""
     layer: Order
-    """1 on the ground, else 1 + the highest layer that it depends on (checked)."""
+    """1 on the ground, else 1 + the highest layer it depends on (checked)."""
     depend: Annotated[tuple[OrderOrGround, ...], Field(min_length=1, max_length=MAX_BLOCKS)]
     """Orders of the blocks that must stand before it; 0 is the ground; never empty, no cycles."""
     position: Position
@@ -96,7 +96,7 @@ class StoredBlock(Line, extra="ignore"):
 
     @classmethod
     def of(cls, block: Block) -> Self:
-        """Return a block as it is written."""
+        """Return the stored form of a block."""
         return cls(
             order=block.order,
             type=block.type,
@@ -108,14 +108,14 @@ class StoredBlock(Line, extra="ignore"):
         )
 
     def block(self) -> Block:
-        """Return the block that the line describes."""
+        """Return the block of the line."""
         depend = tuple(order for order in self.depend if order)
         position_m, euler_deg = triple(self.position), triple(self.euler)
         return Block(self.order, self.type, self.color, position_m, euler_deg, depend, self.layer)
 
 
 class SceneBlock(StoredBlock):
-    """A block of a scene, whose lengths are written as decimals."""
+    """A block of a scene, with lengths written as decimals."""
 
     position: tuple[_Length, _Length, _Length]
     """Origin of the body frame in the world [m], z up, the ground at z = 0."""
@@ -129,18 +129,18 @@ class StoredCandidate(Line, extra="ignore"):
     color: Color
     """Its color."""
     euler: Annotated[Angles, EITHER_NAME]
-    """As of a block."""
+    """As for a block."""
     required: Any = None
     """True if the scene needs it; not read."""
 
     @functools.cached_property
     def candidate(self) -> Candidate:
-        """The candidate that the line describes."""
+        """Return the candidate of the line."""
         return Candidate(self.type, self.color, triple(self.euler))
 
 
 def _block_faults(blocks: Sequence[StoredBlock]) -> Iterator[Fault]:
-    """Yield orders that are used twice, else dependencies that name no block, else a cycle."""
+    """Yield duplicate orders, else dependencies on unknown blocks, else a cycle."""
     orders = [block.order for block in blocks]
     if twice := [i for i, order in enumerate(orders) if order in orders[:i]]:
         for i in twice:
@@ -191,7 +191,7 @@ SceneBlocks = Annotated[
     Field(min_length=1, max_length=MAX_BLOCKS),
     checked(_block_faults),
 ]
-"""Blocks with unique orders whose dependencies are a graph without cycles."""
+"""Blocks with unique orders whose dependencies have no cycle."""
 CandidateList = Annotated[
     tuple[StoredCandidate, ...],
     Field(min_length=1, max_length=MAX_CANDIDATES),
@@ -210,19 +210,19 @@ class StoredScene(Line, extra="ignore"):
     levels: Levels
     """The levels that the scene counts in: `[1]`, `[2]`, `[3]`, `[4]`, `[5]` or `[1, 2]`."""
     parents: Annotated[tuple[Name, ...], Field(min_length=1, max_length=100)]
-    """The base scenes that it was made from, one at least; a base scene names itself. Statistics
+    """The base scenes that it was made from, at least one; a base scene names itself. Statistics
     cluster by them."""
     blocks: Annotated[SceneBlocks, checked(_layer_faults)]
     """The goal structure: 1 to 22 blocks."""
     candidates: CandidateList
     """1 to 16 candidates, numbered from 1 in this order. No two may look the same, and every block
-    needs one of its look."""
+    needs one that looks like it."""
     format: Format = 1
-    """Version of the line, 1 where it does not say."""
+    """Version of the line; default 1."""
 
     @classmethod
     def of(cls, scene: Scene, candidates: CandidateSet) -> Self:
-        """Return a scene as it is written: lengths to a micrometer."""
+        """Return the stored form of a scene: lengths to a micrometer."""
         looks = {block.look for block in scene.blocks}
         offered = [
             StoredCandidate(type=c.type, color=c.color, euler=c.euler_deg, required=c.look in looks)
@@ -242,14 +242,14 @@ class StoredScene(Line, extra="ignore"):
 
 
 def candidate_set(stored: Sequence[StoredCandidate]) -> CandidateSet:
-    """Return the candidate set that these are."""
+    """Return the candidate set of stored candidates."""
     return CandidateSet(tuple(one.candidate for one in stored))
 
 
 def task_of(
     scene: Scene, candidates: CandidateSet, where: str, composite: Path | None = None
 ) -> AssemblyTask:
-    """Return a scene with its candidates; DataError where no candidate can stand for a block."""
+    """Return a scene with its candidates. Raises DataError for a block without a candidate."""
     missing = candidates.missing(scene)
     allowed = "every type, color and orientation that the scene uses"
     faults = []
@@ -263,13 +263,13 @@ def task_of(
 
 
 def read_builtin(folder: Path) -> Dataset:
-    """Return all scenes of a data set folder; DataError with everything that is wrong in it."""
+    """Return all scenes of a data set folder. Raises DataError with all its problems."""
     return _read_scenes(folder, read_set(folder / SCENES_FILE))
 
 
 @functools.lru_cache(2)
 def _read_scenes(folder: Path, content: bytes) -> Dataset:
-    """Return the scenes in a folder's file of this content, which a command reads several times."""
+    """Return the scenes in a file's content; cached, since a command reads them several times."""
     adapter = TypeAdapter(StoredScene)
 
     def read(line: bytes, where: str) -> AssemblyTask:

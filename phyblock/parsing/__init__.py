@@ -1,1 +1,1 @@
-"""Reply text -> what the model meant, with the rule that matched, or a named problem. Pure."""
+"""Parsers from reply text to an answer, with the rule that matched, or a named problem. Pure."""

@@ -1,8 +1,8 @@
-"""Reply text -> the option that was chosen, or an order of all, with the rule that matched.
+"""Parser from reply text to the chosen option, or an order of all, with the rule that matched.
 
-The asked form comes first: JSON, else the last line "Answer: X" (a box or a tag is read as one).
-Where there is none, the last choice that is stated, a letter alone in the last or the first line,
-then the only option that is named. An order is the last one that names every letter once.
+The requested form comes first: JSON, else the last line "Answer: X" (a box or a tag counts as one).
+Otherwise the last stated choice, then a single letter in the last or first line, then the only
+named option. An order is the last one that names every letter once.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
 
 @dataclass(frozen=True)
 class ParsedAnswer:
-    """One letter, or for ordering all letters in order; `problem` says why there is none."""
+    """One letter, or for ordering all letters in order; `problem` is the reason for no answer."""
 
     letters: str | None
     rule: str | None
@@ -28,7 +28,7 @@ class ParsedAnswer:
 
 
 def choice_form(options: Sequence[str], is_ordering: bool) -> AnswerForm[str]:
-    """Return the JSON form of one of the `options` by its letter, or of an order of all."""
+    """Return the JSON form of one option's letter, or of an order of all."""
     letters = LETTERS[: len(options)]
     letter = {"type": "string", "enum": list(letters)}
     if not is_ordering:
@@ -39,7 +39,7 @@ def choice_form(options: Sequence[str], is_ordering: bool) -> AnswerForm[str]:
 
 
 def parse_answer(text: str, options: Sequence[str], is_ordering: bool) -> ParsedAnswer:
-    """Read the answer out of a reply to a question that shows `options`, the first one as A."""
+    """Parse the answer from a reply to a question with these `options`, the first one as A."""
     answer = answer_of(text)
     if not answer:
         return ParsedAnswer(None, None, "empty" if answer == "" else "thoughts_only")
@@ -96,7 +96,7 @@ def _choice(plain: str, options: Sequence[str]) -> tuple[str, str | None]:
 
 
 def _named(value: str, options: Sequence[str]) -> str | None:
-    """Return the letter of the one option that a short text names by text, letter or number."""
+    """Return the letter of the only option that a short text names, by text, letter or number."""
     letters, texts = LETTERS[: len(options)], [_folded(option) for option in options]
     if texts.count(_folded(value)) == 1:
         return letters[texts.index(_folded(value))]
@@ -113,7 +113,7 @@ def _named(value: str, options: Sequence[str]) -> str | None:
 
 
 def _folded(text: str) -> str:
-    """Return a text as options are compared: no case, edges, articles or double blanks."""
+    """Return a text normalized for comparison: without case, edges, articles or double blanks."""
     folded = " ".join(text.casefold().split()).strip(" .,:;!?()[]{}<>\"'*-")
     return re.sub(r"^(?:the|an|a) ", "", folded)
 

@@ -1,8 +1,8 @@
-"""Reply text -> one operation of step planning, `Move(3)` or `Done`, with the rule that matched.
+"""Parser from reply text to one operation, `Move(3)` or `Done`, with the rule that matched.
 
-The operation is JSON of the asked form, else the last line that is nothing else, else what stands
-behind a label ("Next plan: Move(3)"), else the one that is mentioned. `Done` counts as an answer
-alone, never as a word of a sentence. Two operations where one is asked for are not guessed at.
+The operation is JSON of the requested form, else the last line that is only an operation, else the
+text after a label ("Next plan: Move(3)"), else the only one that is mentioned. `Done` counts only
+as a whole answer, never as a word in a sentence. The parser never guesses between two operations.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ MOVE_PROBLEMS: tuple[MoveProblem, ...] = get_args(MoveProblem)
 
 @dataclass(frozen=True)
 class ParsedMove:
-    """A candidate's number as it stands in a reply, `Done`, or a problem.
+    """A candidate's number in a reply, `Done`, or a problem.
 
-    `move` may be a number that no candidate has; `rule` is None where nothing was found.
+    `move` may be a number that no candidate has; `rule` is None if nothing was found.
     """
 
     move: int | None = None
@@ -52,14 +52,14 @@ _MENTION = re.compile(rf"\b(?:{_CALL})", re.I)
 
 
 def move_form(n_candidates: int, *, reasons: bool = True) -> AnswerForm[ParsedMove]:
-    """Return the JSON form of an operation in the words of its prompt: `Move(N)` or `Done`."""
+    """Return the JSON form of an operation: `Move(N)` or `Done`."""
     words = [*(f"Move({number})" for number in range(1, n_candidates + 1)), "Done"]
     value = {"type": "string", "enum": words}
     return AnswerForm("operation", value, _meaning, '"Move(N)"', reasons)
 
 
 def parse_move(text: str) -> ParsedMove:
-    """Read the one operation that a reply names."""
+    """Parse the only operation in a reply."""
     answer = answer_of(text)
     if answer is None:
         return ParsedMove(problem="thoughts_only")
@@ -87,7 +87,7 @@ def parse_move(text: str) -> ParsedMove:
 
 
 def _verdict(found: Sequence[re.Match[str]], rule: str) -> ParsedMove:
-    """Return the one operation of several matches."""
+    """Return the operation that all matches agree on, or a problem."""
     said = [next(group for group in match.groups() if group) for match in found]
     operations = {None if word.lower() == "done" else int(word) for word in said}
     if len(operations) > 1:

@@ -1,10 +1,10 @@
-"""Reply text -> Plan, with the rule that matched, or a named problem.
+"""Parsers from reply text to a plan, with the rule that matched, or a named problem.
 
 `official` is the released code's rule: every `block with index N` of the whole reply, in order.
-`steps`, the default, reads the form that was asked for, however it is decorated: JSON, else step
-lines, else a list whose items each name a block, else a bracketed list of numbers behind a word
-like "plan". Of several lists the last complete one is read, and what stands around it changes
-nothing. Both drop numbers that no candidate has and report them. Neither raises on any text.
+`steps`, the default, reads the requested form with any decoration: JSON, else step lines, else a
+list whose items each name a block, else a bracketed list of numbers after a word like "plan". The
+last complete list counts, and text around it changes nothing. Both parsers drop numbers that no
+candidate has and report them. Neither raises on any text.
 """
 
 from __future__ import annotations
@@ -26,17 +26,17 @@ from phyblock.parsing.text import (
 from phyblock.types import PlanParser
 
 _REPLIES_KEPT = 1024
-"""Rules, and models at several seeds, often give the same reply."""
+"""Cached replies: rules, and models at several seeds, often give the same one."""
 
 PlanProblem = Literal["empty", "thoughts_only", "no_plan"]
 
 
 @dataclass(frozen=True)
 class ParsedPlan:
-    """A plan that was read out of a reply.
+    """A plan that was parsed from a reply.
 
-    `rule` names its form, None when nothing could be read: then `problem` says why. `dropped` are
-    numbers that were read but name no candidate; `truncated` is true where the text breaks off.
+    `rule` names its form; if nothing could be parsed it is None, and `problem` is the reason.
+    `dropped` are numbers without a candidate; `truncated` is true if the text breaks off.
     """
 
     plan: Plan
@@ -48,7 +48,7 @@ class ParsedPlan:
 
 @lru_cache(_REPLIES_KEPT)
 def parse_plan(text: str, n_candidates: int, parser: PlanParser = "steps") -> ParsedPlan:
-    """Read the plan out of a reply to a question with candidates 1..n_candidates."""
+    """Parse the plan from a reply to a question with candidates 1..n_candidates."""
     if parser == "official":
         numbers = [int(match[1]) for match in _OFFICIAL.finditer(text)]
         rule, is_cut = "block_with_index", False
@@ -70,7 +70,7 @@ def plan_form(n_candidates: int) -> AnswerForm[list[int]]:
     return AnswerForm("plan", {"type": "array", "items": number}, _json_plan, "[N, N, ...]")
 
 
-# Longer runs of digits are no block numbers, and int() refuses thousands of digits.
+# Longer runs of digits are not block numbers, and int() refuses thousands of digits.
 _OFFICIAL = re.compile(r"block with index (\d{1,6})(?!\d)")
 _KEYS = ("block", "index", "block_index", "candidate", "id")
 
@@ -86,7 +86,7 @@ def _json_plan(value: Any) -> list[int] | None:
 
 
 def _steps(answer: str, n_candidates: int) -> tuple[str, list[int], bool]:
-    """Return the rule, the numbers of the plan, and True where the text breaks off in it."""
+    """Return the rule, the numbers of the plan, and True if the text breaks off in it."""
     if "{" in answer and (stated := plan_form(n_candidates).read(answer)):
         return "json", stated, False
     lines, is_cut = plain_lines(answer), is_open(answer)
@@ -101,7 +101,7 @@ def _steps(answer: str, n_candidates: int) -> tuple[str, list[int], bool]:
         found += [(rule, numbers, is_begun)] * bool(numbers)
         if numbers and not is_begun:
             break
-    if found:  # A list that was begun anew in another form may be whole above.
+    if found:  # A list that was started again in another form may be complete above.
         goes_on = not found[-1][2] and found[-1][1][: len(found[0][1])] == found[0][1]
         return found[-1] if goes_on else found[0]
     numbers = _numbers(lines)
@@ -117,7 +117,7 @@ def _forms(lines: list[str]) -> Iterator[tuple[str, list[StepList]]]:
 
 
 def _drop_growing(numbers: list[int], n_candidates: int) -> None:
-    """Drop the last number where another digit may have followed."""
+    """Drop the last number if another digit may have followed."""
     if numbers and 10 * numbers[-1] <= n_candidates:
         numbers.pop()
 
@@ -141,7 +141,7 @@ _TIMES = re.compile(
 
 @dataclass
 class Item:
-    """A step or an item of a list; `span` is how many steps it says it is."""
+    """A step or an item of a list; `span` is the number of steps that it stands for."""
 
     number: int | None
     span: int
@@ -187,12 +187,12 @@ _ITEM = re.compile(
 _ACTS = re.compile(rf"[\W\d]{{0,20}}{_VERB}", re.I)
 _WORD = re.compile(r"[^\W\d]")
 _BLANK = re.compile(r"[\W\d]*+(?:json|plaintext|text|yaml)?[\W\d]*+\Z")
-_NEAR = 40  # Lines that are looked at under an item and above a list.
+_NEAR = 40  # Lines that are examined under an item and above a list.
 
 
 @dataclass
 class StepList:
-    """Items that follow one another, the titles above them, and what was read out of them."""
+    """Consecutive items, the titles above them, and their parsed values."""
 
     items: list[Item]
     titles: list[str]
@@ -200,17 +200,17 @@ class StepList:
 
     @property
     def title(self) -> str:
-        """The last line above that says something."""
+        """The last line of text above."""
         return self.titles[0] if self.titles else ""
 
     def ends_text(self, lines: Sequence[str]) -> bool:
-        """True if nothing stands behind the last item."""
+        """True if nothing follows the last item."""
         last = self.items[-1]
         return all(map(_BLANK.match, lines[last.line + 1 + len(last.more) :]))
 
 
 def step_lists(lines: list[str]) -> list[StepList]:
-    """Return the runs of step lines whose numbering goes on, whatever stands between them."""
+    """Return the runs of step lines with continuous numbering, whatever is between them."""
     lines[:] = _LABEL.sub("\n", "\n".join(lines)).split("\n")
     runs: list[list[Item]] = []
     end = 0
@@ -262,7 +262,7 @@ def item_lists(lines: list[str]) -> tuple[list[StepList], list[StepList]]:
 
 
 def _with_titles(runs: list[list[Item]], lines: list[str]) -> list[StepList]:
-    """Return the lists of which at least half the items name a block, with up to three titles."""
+    """Return the lists in which at least half the items name a block, with up to three titles."""
     found: list[StepList] = []
     for items in runs:
         if sum(bool(item.blocks) for item in items) * 2 >= len(items):
@@ -293,10 +293,10 @@ _FOR = re.compile(r"\bfor\b", re.I)
 def chosen_list(
     lists: Sequence[StepList], lines: Sequence[str], *, is_open: bool
 ) -> tuple[list[Any], bool]:
-    """Return the values of the last complete plan, and True where the text breaks off in it.
+    """Return the values of the last complete plan, and True if the text breaks off in it.
 
-    Lists that begin anew under titles of parts (a structure, a layer) are one plan. A list that the
-    text breaks off in loses to the plan before it if it says the beginning of that.
+    Lists that restart under titles of parts (a structure, a layer) are one plan. A list that breaks
+    off is ignored if it repeats the beginning of the plan before it.
     """
     plans: list[list[StepList]] = []
     goes_on, end = True, 0
@@ -320,7 +320,7 @@ def chosen_list(
 
 
 def _is_part(one: StepList, plan: list[StepList]) -> bool:
-    """Return True if a list that begins anew goes on with a plan: it builds something else."""
+    """True if a list that restarts continues a plan, since it builds something else."""
     titles = [part.title for part in plan]
     is_anew = any(_WHOLE.search(title) or _EXPLAINS.search(title) for title in one.titles)
     if is_anew or len(one.title) > 80 or (one.title and one.title in titles):
@@ -330,7 +330,7 @@ def _is_part(one: StepList, plan: list[StepList]) -> bool:
     if one.title and (_PLAN.search(one.title) or not _HEADING.search(one.title)):
         return False
     if not one.title and ('"' in one.items[0].text) != ('"' in plan[-1].items[0].text):
-        return False  # The plan once more, in another form.
+        return False  # The same plan again, in another form.
     n_same = min(len(plan[0].values), len(one.values))
     return plan[0].values[:n_same] != one.values[:n_same]
 
@@ -344,7 +344,7 @@ _ALONE = re.compile(rf"\W{{0,9}}+{_SEQUENCE}\Z")
 
 
 def _numbers(lines: list[str]) -> list[int]:
-    """Return the last list of numbers behind a word for a plan, or that is the whole reply."""
+    """Return the last list of numbers after a word for a plan, or that is the whole reply."""
     with_digits = [line for line in lines if re.search(r"\d", line)]
     for line in reversed(with_digits):
         found = _NUMBERS.search(line)

@@ -1,8 +1,8 @@
-"""Reply text -> plan with poses, with the rule that matched, or a named problem.
+"""Parser from reply text to a plan with poses, with the rule that matched, or a named problem.
 
-A plan is JSON of the asked form, else the last list of step lines, of items or of table rows: each
-says a block and three coordinates. It is read whole or not at all: what is left of a plan without
-one of its steps would be another plan.
+A plan is JSON of the requested form, else the last list of step lines, items or table rows, each
+with a block and three coordinates. It is read as a whole or not at all: a plan with a step missing
+would be another plan.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _NAMES = ("x", "y", "z")
 
 @dataclass(frozen=True)
 class ParsedPoses:
-    """A plan that was read out of a reply; `problem` says why none was where `rule` is None."""
+    """A plan that was parsed from a reply; if `rule` is None, `problem` is the reason."""
 
     steps: tuple[PoseStep, ...]
     rule: str | None
@@ -54,7 +54,7 @@ def pose_form(n_candidates: int) -> AnswerForm[list[PoseStep | _StepProblem]]:
 
 
 def parse_poses(text: str, n_candidates: int) -> ParsedPoses:
-    """Read the plan out of a reply; blocks that no candidate is stay in it."""
+    """Parse the plan from a reply; numbers that no candidate has stay in it."""
     answer = answer_of(text)
     if not answer:
         return ParsedPoses((), None, "empty" if answer == "" else "thoughts_only")
@@ -93,7 +93,7 @@ _LONG = re.compile(r"(?<=^[cm])(?:enti|illi)|et(?:er|re)s?$")  # What a short un
 
 
 def _step(text: str) -> PoseStep | _StepProblem:
-    """Read a block and its place out of the text of a step."""
+    """Parse a block and its place from the text of a step."""
     block = _BLOCK.search(text)
     rest = _OTHERS.sub(" ", text[block.end() :]) if block else ""
     found = [(m[1] or "", float(m[2]), (m[3] or "").lower()) for m in _VALUE.finditer(rest)]
@@ -110,7 +110,7 @@ def _step(text: str) -> PoseStep | _StepProblem:
 
 
 def _checked(block: int, place: Sequence[float]) -> PoseStep | _StepProblem:
-    """Return a step of finite numbers that a table has room for."""
+    """Return the step, or a problem if its numbers are not finite or too large."""
     if not all(map(math.isfinite, place)):
         return "unclear_step"
     if max(map(abs, place)) > FARTHEST_PLACE_CM:

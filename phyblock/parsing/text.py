@@ -1,7 +1,7 @@
-"""Text of a reply as readers take it: reasoning cut, fences opened, Markdown stripped; JSON in it.
+"""Preparation of replies for parsers: reasoning removed, fences opened, Markdown stripped; JSON.
 
-Every function here and in the readers is linear in the text: no pattern nests one repetition in
-another over the same characters, and each line is looked at a fixed number of times.
+Every function here and in the parsers is linear in the text: no pattern nests one repetition in
+another over the same characters, and each line is examined a fixed number of times.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
-READER_VERSION = 8  # Of all readers; it goes up when any reply can be read otherwise than before.
+READER_VERSION = 8  # Of all parsers; increased when a reply may be parsed differently.
 
 _NAMES = r"(?:think(?:ing)?|thoughts?|reasoning|scratchpad|analysis|reflection)"
 _THINKING = re.compile(
@@ -35,7 +35,7 @@ _ESCAPED = re.compile(r"\\n(?![a-z])")
 
 
 def answer_of(text: str) -> str | None:
-    """Return what a reply says outside of its reasoning, or None where it is reasoning alone.
+    """Return a reply without its reasoning, or None if it is only reasoning.
 
     Digits, quotation marks and blanks of other scripts become plain ones.
     """
@@ -57,7 +57,7 @@ def answer_of(text: str) -> str | None:
 def plain_lines(answer: str) -> list[str]:
     """Return the lines of an answer without fences, emphasis and LaTeX.
 
-    An answer in a frame (a box, a tag) stands on a line of its own behind "Answer:".
+    An answer in a box or a tag becomes a separate line after "Answer:".
     """
     opened = _ESCAPED.sub("\n", _STRUCK.sub("", answer)).replace('\\"', '"')
     opened = _FRAME.sub(
@@ -75,7 +75,7 @@ def is_open(answer: str) -> bool:
 
 
 def _plain(odd: re.Match[str]) -> str:
-    """Return a character in compatibility form; superscripts and fractions are no digits."""
+    """Return a character in compatibility form; superscripts and fractions are not digits."""
     character = odd[0]
     if unicodedata.category(character) == "Cf":
         return ""
@@ -93,9 +93,9 @@ MeaningT = TypeVar("MeaningT")
 class AnswerForm(Generic[MeaningT]):
     """A form of answers, in keywords of JSON schema that all providers know.
 
-    `key` holds the answer, `value` is the schema of what stands there, `meaning` reads it and
-    returns None for what is no answer. `example_value` shows the form with letters in the place of
-    an answer, so that it is none itself.
+    `key` holds the answer, `value` is its schema, `meaning` parses it and returns None if it is not
+    an answer. `example_value` shows the form with letters as placeholders, so that it is not an
+    answer itself.
     """
 
     key: str
@@ -124,12 +124,12 @@ class AnswerForm(Generic[MeaningT]):
 
     @property
     def example(self) -> str:
-        """The form as prompts show it."""
+        """The form as shown in prompts."""
         first = f'"{REASONING}": "...", ' if self.reasons else ""
         return f'{{{first}"{self.key}": {self.example_value}}}'
 
     def read(self, answer: str) -> MeaningT | None:
-        """Return the answer of the last JSON object that holds one, wherever it stands, or None."""
+        """Return the answer of the last JSON object that holds one, anywhere in it, or None."""
         starts = [brace.start() for brace in re.finditer(r"\{", answer)]
         for start in reversed(starts[-_MOST_OBJECTS:]):
             try:
@@ -143,7 +143,7 @@ class AnswerForm(Generic[MeaningT]):
 
 
 def whole_number(value: object) -> int | None:
-    """Return a JSON value that is a whole number of at most six digits, also as text, or None."""
+    """Return a whole number of at most six digits, given as a JSON number or text, or None."""
     if isinstance(value, str) and re.fullmatch(r"\s{0,9}-?[0-9]{1,6}\s{0,9}", value):
         return int(value)
     if isinstance(value, bool) or not isinstance(value, int):

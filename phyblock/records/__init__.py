@@ -1,1 +1,1 @@
-"""Every line and file of a run that is written and read again, each declared once."""
+"""The lines and files of a run, each declared once for writing and reading."""

@@ -1,9 +1,8 @@
-"""The files of a run folder: `run.yaml`, which says what it is, and those of JSON lines.
+"""The files of a run folder: `run.yaml`, its manifest, and files of JSON lines.
 
-Lines are read one at a time and within bounds. Their files only ever grow: a later record of a
-sample replaces an earlier one, and a last line that a kill cut short is not there. Every other line
-that is not what its file holds, or is not of the run that it should be of, is an error that names
-file, line and field.
+Lines are read one at a time and within bounds. Files only grow: a later record of a sample replaces
+an earlier one, and a last line that a kill cut short is ignored. Every other line that is malformed
+or belongs to another run is an error that names file, line and field.
 """
 
 from __future__ import annotations
@@ -38,19 +37,19 @@ from phyblock.records.record import (
 from phyblock.registry import known_tracks
 
 FORMAT = 1
-"""Version of run folders; one that adds fields alone stays the same."""
+"""Version of run folders; additional fields do not change it."""
 MANIFEST = "run.yaml"
 _HINT = "run.yaml is written by `phyblock run` and never edited: restore it from a copy"
 _DIGITS = 16
 _LARGEST_BYTES = 2 * 1024 * 1024
-"""Far above what a suite of the largest allowed size comes to."""
+"""Far above the manifest of the largest allowed suite."""
 
 
 Version = Annotated[int, Field(ge=1)]
 
 
 class ManifestModel(Line):
-    """A model of the run; what decides its replies stands beside it."""
+    """A model of the run, with everything that determines its replies."""
 
     name: str
     """Its name in the run."""
@@ -61,12 +60,12 @@ class ManifestModel(Line):
     served_at: tuple[str, ...] = ()
     """Addresses of your own servers at which it was called when the run began."""
     kind: str = ""
-    """`litellm`: asked over the network; `replay`: a recording; `baseline`: a rule; `human`: a
+    """`litellm`: called over the network; `replay`: a recording; `baseline`: a rule; `human`: a
     person."""
 
     @property
     def is_baseline(self) -> bool:
-        """True if it is a rule; rules have no rank among models."""
+        """True if it is a rule, which has no rank among models."""
         return self.kind == "baseline"
 
 
@@ -83,7 +82,7 @@ class ManifestDataset(Line):
     name: str
     """Its name."""
     sha256: str
-    """Digest of the scenes that were asked about."""
+    """Digest of the scenes of the run."""
     version: Version = 1
     """Its version; results on different versions are never mixed."""
     format: str = "builtin"
@@ -104,49 +103,51 @@ class ManifestQuestions(Line):
 
 
 class Manifest(Line):
-    """A description of a run, written before anything is asked."""
+    """The description of a run, written before any request."""
 
     identity: str
-    """Digest of everything that decides the results: only the same run continues in a folder."""
+    """Digest of everything that determines the results; only the same run can continue in a
+    folder."""
     created: str = ""
-    """The time when it was begun, UTC."""
+    """Time of its start, UTC."""
     format: Annotated[int, Field(ge=1, le=FORMAT)] = FORMAT
     """Version of the run folder."""
     suite: dict[str, Any] = Field(default_factory=dict)
-    """The suite, with all defaults filled in."""
+    """The suite, including all defaults."""
     models: Annotated[tuple[ManifestModel, ...], checked(_same_names)] = ()
-    """The models and how they are called."""
+    """The models and their parameters."""
     others: tuple[ManifestModel, ...] = ()
-    """Models that ran in this folder before, but were not named this time: their records stay, and
-    tables leave them out until they are named again."""
+    """Models of earlier commands in this folder that the last command did not name: their records
+    are kept, and tables omit them until they are named again."""
     dataset: ManifestDataset | None = None
     """The data set."""
     tracks: dict[str, dict[str, Any]] = Field(default_factory=dict)
-    """Digests of what decides the results of each track: prompt, pictures, questions."""
+    """Digests of everything that determines the results of each track: prompt, pictures,
+    questions."""
     variants: dict[str, dict[str, dict[str, Any]]] = Field(default_factory=dict)
-    """The same digests by condition, as records name it, and track; empty: there is only one."""
+    """The same digests by condition, as named in records, and track; empty: only one condition."""
     limit: int | None = None
-    """Most items of each track."""
+    """Maximum number of items of each track."""
     questions: ManifestQuestions | None = None
-    """The question set, where one is asked."""
+    """The question set; null: no questions."""
     items: dict[str, int] = Field(default_factory=dict)
-    """Number of items that each track asks about."""
+    """Number of items of each track."""
     scenes: int = 0
-    """Distinct scenes."""
+    """Number of distinct scenes."""
     scenes_by_level: dict[int, int] = Field(default_factory=dict)
-    """Scenes of each level; one scene may be of several."""
+    """Number of scenes of each level; a scene may have several."""
     engine: str | None = None
-    """The physics engine, with its version; null where nothing in the run depends on one."""
+    """The physics engine, with its version; null: nothing in the run depends on one."""
     versions: dict[str, str] = Field(default_factory=dict)
-    """Versions of Python, of libraries, and of the readers that read the replies."""
+    """Versions of Python, libraries and parsers."""
 
     @property
     def run(self) -> str:
-        """The digest by which its records show that they are its own."""
+        """The digest that its records carry."""
         return self.identity[:_DIGITS]
 
     def selects(self, model: str, seed: int) -> bool:
-        """True if the models and seeds of the run include these; others may be on file."""
+        """True if the run includes this model and seed; records of others may exist."""
         seeds = self.suite.get("seeds")
         return seed in (seeds or [seed]) and (
             not self.models or any(model == one.name for one in self.models)
@@ -154,7 +155,7 @@ class Manifest(Line):
 
 
 def read_manifest(folder: Path) -> Manifest:
-    """Return the run's manifest; StoreError when there is none or it cannot be read."""
+    """Return the run's manifest. Raises StoreError if it is missing or cannot be read."""
     path = folder / MANIFEST
     try:
         return _manifest(read_text(path, _LARGEST_BYTES), str(path))
@@ -170,13 +171,13 @@ def read_manifest(folder: Path) -> Manifest:
 
 @functools.lru_cache(maxsize=2)
 def _manifest(text: str, where: str) -> Manifest:
-    """Return a manifest, which one command reads several times."""
+    """Return a manifest; cached, since one command reads it several times."""
     source = parse_yaml(text, where, _LARGEST_BYTES)
     return validated(Manifest, source.data, source)
 
 
 def suite_of(manifest: Manifest, where: str) -> Suite:
-    """Return the suite of a run; StoreError naming `where` and every field that is wrong."""
+    """Return the suite of a run. Raises StoreError naming `where` and every wrong field."""
     try:
         return suite_model().model_validate(manifest.suite)
     except ValidationError as error:
@@ -197,10 +198,10 @@ LineT = TypeVar("LineT", bound=Line)
 
 @dataclass(frozen=True)
 class Validation:
-    """Shows that records and calls are those of a run, by its digest and their names.
+    """Checks that records and calls belong to a run, by its digest and their names.
 
-    `samples` are all ids of the run, where its plan is known. Records of models and seeds that the
-    run does not select at present are passed over, unless it is taken as a `whole`.
+    `samples` are all ids of the run, if its plan is known. Records of models and seeds that the run
+    does not select now are skipped, except with `whole`.
     """
 
     manifest: Manifest
@@ -208,14 +209,14 @@ class Validation:
     whole: bool = False
 
     def takes(self, line: Line) -> bool:
-        """True if a line is to be seen."""
+        """True if a line is not skipped."""
         return self.whole or not isinstance(line, Record) or self._selects(line)
 
     def _selects(self, record: Record) -> bool:
         return self.manifest.selects(record.model, record.seed)
 
     def problem(self, where: str, line: Line) -> Problem | None:
-        """Return what shows that a record or call is of another run, or None."""
+        """Return the evidence that a record or call belongs to another run, or None."""
         if not isinstance(line, Record | Call):
             return None
         field, found, allowed = "sample", line.sample, line.sample
@@ -240,12 +241,11 @@ class Validation:
 
 
 class Lines(Generic[LineT]):
-    """Every line of a file with where it stands, one at a time, oldest first.
+    """Every line of a file with its place, one at a time, oldest first.
 
-    A last line without its newline counts all the same when it is whole; else, as a kill leaves it
-    behind, it ends the iteration: `is_cut` is then set. `lacks_newline` says that the last one
-    needs one. `whole_bytes` is the size of the lines passed so far, `start_bytes` where the last of
-    them begins.
+    A last line without a newline counts if it is complete; otherwise, as after a kill, it ends the
+    iteration and sets `is_cut`. `lacks_newline` is set if the last line has no newline.
+    `whole_bytes` is the size of the lines read so far, `start_bytes` the start of the last one.
     """
 
     file: ClassVar[str]
@@ -254,7 +254,7 @@ class Lines(Generic[LineT]):
     kind: ClassVar[type[Line]]
 
     def __init__(self, folder: Path, validation: Validation | None = None) -> None:
-        """Without a `validation` lines of any run are taken."""
+        """Without a `validation`, lines of any run are accepted."""
         self.path = folder / self.file
         self.is_cut = False
         self.lacks_newline = False
@@ -264,7 +264,7 @@ class Lines(Generic[LineT]):
         self._validation = validation
 
     def adapter(self) -> TypeAdapter[Any]:
-        """Return what reads a line."""
+        """Return the type adapter of a line."""
         return TypeAdapter(self.kind)
 
     def __iter__(self) -> Iterator[tuple[str, LineT]]:
@@ -301,7 +301,7 @@ class Lines(Generic[LineT]):
             raise StoreError(Problem(str(self.path), str(error))) from error
 
     def at(self, starts: Iterable[int]) -> Iterator[LineT]:
-        """Yield the lines that begin at these places [bytes], which were passed before."""
+        """Yield the lines that begin at these offsets [bytes], which were read before."""
         if self.path.exists():
             with open_regular(self.path) as file:
                 for start in starts:
@@ -319,7 +319,7 @@ class Lines(Generic[LineT]):
 
 
 def _is_cut(line: bytes) -> bool:
-    """True if a line is no JSON, as one that a kill cut short; one out of bounds is whole."""
+    """True if a line is not JSON, as after a kill; one that is out of bounds is complete."""
     try:
         if len(line) <= _LONGEST_LINE_BYTES:
             json.loads(line)
@@ -331,7 +331,7 @@ def _is_cut(line: bytes) -> bool:
 
 
 class RecordLines(Lines[Record]):
-    """The records of a run folder, each read by the model of its track."""
+    """The records of a run folder, each with the model of its track."""
 
     file = RECORDS
     kind = Record
@@ -339,12 +339,12 @@ class RecordLines(Lines[Record]):
     hint = "restore the file from a copy, or remove this line: its sample is then run again"
 
     def adapter(self) -> TypeAdapter[Any]:
-        """Return what reads a record by the model of its track."""
+        """Return the type adapter of a record, by the model of its track."""
         return known_records()
 
 
 class CallLines(Lines[Call]):
-    """The calls of a run folder, each when it was sent and when it had ended."""
+    """The calls of a run folder, each with a line before it was sent and one at its end."""
 
     file = CALLS
     kind = Call
@@ -382,7 +382,7 @@ def record_types() -> tuple[type[Record], ...]:
 
 
 def known_records() -> TypeAdapter[Record]:
-    """Return what reads a record by the model of its track."""
+    """Return the type adapter of a record, by the model of its track."""
     return _adapter(record_types())
 
 
@@ -399,10 +399,10 @@ def run_records(
     *,
     whole: bool = False,
 ) -> RecordLines:
-    """Return the records of a run folder; any that are not the run's own are a StoreError.
+    """Return the records of a run folder. Raises StoreError for records of another run.
 
-    `manifest` is that of the folder, read where it is not given; `samples` are the ids of its
-    plan, where that is known. Models and seeds that it does not select are seen with `whole` alone.
+    `manifest` is that of the folder, which is read if not given; `samples` are the ids of its plan,
+    if known. Models and seeds that it does not select are included only with `whole`.
     """
     return RecordLines(folder, Validation(manifest or read_manifest(folder), samples, whole))
 
@@ -410,16 +410,16 @@ def run_records(
 def read_records(folder: Path, manifest: Manifest | None = None) -> Iterator[Record]:
     """Yield the newest record of every sample, in order of first appearance, one at a time.
 
-    Raises StoreError for a line that is no record of the run before the first is given.
+    Raises StoreError for a line that is not a record of the run, before the first is yielded.
     """
     lines = run_records(folder, manifest)
     return lines.at(newest_starts(lines).values())
 
 
 def newest_starts(lines: RecordLines, tracks: Collection[str] | None = None) -> dict[str, int]:
-    """Return where the newest record of every sample begins [bytes], in order of appearance.
+    """Return the offset of the newest record of every sample [bytes], in order of appearance.
 
-    Only samples of `tracks` are taken, of all where it is None.
+    Only samples of `tracks` are included, or all if it is None.
     """
     starts: dict[str, int] = {}
     for _, record in lines:
@@ -429,7 +429,7 @@ def newest_starts(lines: RecordLines, tracks: Collection[str] | None = None) -> 
 
 
 def read_stopped(folder: Path) -> Stopped:
-    """Return what stopped a run: nothing where it was not stopped."""
+    """Return the reasons why a run was stopped, if any."""
     path = folder / STOPPED
     try:
         return Stopped.model_validate_json(read_bytes(path))

@@ -1,7 +1,7 @@
-"""Lines that are written and read again: replies, records of them, calls, prompts, batches.
+"""Lines of a run's files: replies, records, calls, prompts, batches.
 
-`Record` declares what all tracks have in common. A track declares what it adds in a subclass of
-its own, with its name as the literal type of `track`.
+`Record` declares the fields that all tracks share. A track declares its own in a subclass, with its
+name as the literal type of `track`.
 """
 
 from __future__ import annotations
@@ -25,16 +25,16 @@ LARGEST_WHOLE = 2**53
 
 
 def _finite(value: Any) -> Any:
-    """Return a value that no model declares, which JSON must be able to hold."""
+    """Return a value of an undeclared field if JSON can hold it."""
     json.dumps(value, allow_nan=False)
     return value
 
 
 class Line(BaseModel):
-    """A JSON object that is written and read again, or a part of one.
+    """A JSON object in a run's files, or a part of one.
 
-    Fields keep the order in which they are declared, and only those that were given are written,
-    with fields that are not known, so that a line that was read is written again as it was.
+    Fields keep their declared order. Only fields that were given are written, including unknown
+    ones, so that a line is written back as it was read.
     """
 
     # Building is deferred because most commands read one kind of line, if any.
@@ -42,11 +42,11 @@ class Line(BaseModel):
     __pydantic_extra__: dict[str, Annotated[Any, AfterValidator(_finite)]] = Field(init=False)
 
     def as_given(self) -> dict[str, Any]:
-        """Return what was given, as it is, in the order in which it is written."""
+        """Return the given fields unchanged, in the order of writing."""
         return {name: value for name, value in self if name in self.model_fields_set}
 
     def fields(self) -> dict[str, Any]:
-        """Return the line as it is written: plain values, nothing that was not given."""
+        """Return the given fields as plain values, as they are written."""
         return self.model_dump(exclude_unset=True)
 
     def as_json(self) -> str:
@@ -62,15 +62,15 @@ Whole = Annotated[int, Field(ge=-LARGEST_WHOLE, le=LARGEST_WHOLE)]
 Amount = Annotated[float, Field(allow_inf_nan=False)]
 """A finite number."""
 Usd = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-"""An amount of money [US dollars], which a cost limit can be kept on top of."""
+"""A finite amount of money [US dollars], at least 0."""
 
 
 def validated(
     kind: type[LineT], raw: object, source: YamlSource | str, base: FieldPath = ()
 ) -> LineT:
-    """Return decoded data as a line; DataError with everything that is wrong with it.
+    """Return decoded data as a line. Raises DataError with all problems.
 
-    The data stands at `base` in a YAML source, or all at one place.
+    The data is at `base` in a YAML source, or all at one place.
     """
     try:
         return kind.model_validate(raw)
@@ -81,15 +81,15 @@ def validated(
 def decode(
     adapter: TypeAdapter[ValueT], data: bytes, where: str, kind: type[BaseModel] = Line
 ) -> ValueT:
-    """Return JSON text as what `adapter` reads, without changing the type of anything.
+    """Return JSON text as validated by `adapter`, without type coercion.
 
-    Raises DataError with everything that is wrong with it; `kind` is the model of what is read.
-    Lone surrogates, which no output could hold, become U+FFFD.
+    Raises DataError with all problems; `kind` is the model of the value. Lone surrogates, which no
+    output could hold, become U+FFFD.
     """
     try:
         return adapter.validate_json(data, strict=True)
     except ValidationError:
-        pass  # Most lines are valid: only one that is not is decoded again, to find the reason.
+        pass  # Only invalid lines are decoded again, to find the reason.
     try:
         value = _storable(load_json(data.decode("utf-8")))
     except json.JSONDecodeError as error:
@@ -105,14 +105,14 @@ def decode(
 
 
 def not_a(noun: str, error: InputError, hint: str) -> StoreError:
-    """Return the error of a file of runs that holds no `noun`, for what is wrong in it."""
+    """Return the error that a file of a run is not a `noun`, with its problems."""
     return StoreError(
         replace(one, message=f"is not a {noun}: {one.message}", hint=hint) for one in error.problems
     )
 
 
 def _storable(value: Any) -> Any:
-    """Return a decoded value with texts that UTF-8 can hold."""
+    """Return a decoded value with texts that UTF-8 can encode."""
     if isinstance(value, str):
         return well_formed(value)
     if isinstance(value, list):
@@ -135,54 +135,54 @@ def _within(number: _NumberT | None, least: int) -> _NumberT | None:
 
 
 class Usage(Line):
-    """Tokens of a reply as the provider counted them; null where it did not say."""
+    """Tokens of a reply as counted by the provider; null: not reported."""
 
     prompt_tokens: Whole | None = None
-    """Tokens of the prompt, pictures included."""
+    """Tokens of the prompt, including pictures."""
     completion_tokens: Whole | None = None
     """Tokens of the reply."""
     reasoning_tokens: Whole | None = None
-    """Those of `completion_tokens` that were spent on reasoning."""
+    """The part of `completion_tokens` spent on reasoning."""
     cached_tokens: Whole | None = None
-    """Those of `prompt_tokens` that the provider had in its prompt cache."""
+    """The part of `prompt_tokens` that the provider read from its prompt cache."""
     cache_write_tokens: Whole | None = None
-    """Those of `prompt_tokens` that it put into its prompt cache and bills as such."""
+    """The part of `prompt_tokens` that it wrote to its prompt cache and bills as such."""
 
 
 class Reply(Line):
-    """An answer that was read."""
+    """A reply of a model."""
 
     text: str
     """The answer."""
     reasoning: str = ""
-    """The reasoning that the provider showed beside it."""
+    """The reasoning that the provider returned with it."""
     finish: Finish = "stop"
     """The reason why it ended: by itself, at the token limit, by a content filter, or unknown."""
     usage: Usage = Usage()
     """Its tokens."""
     cost_usd: Usd | None = None
-    """Its price [US dollars]; null: not known."""
+    """Its price [US dollars]; null: unknown."""
     billed_usd: Usd | None = None
-    """Amount that `max_cost_usd` counts [US dollars], failed attempts included; a reply without
-    token counts counts with its highest cost. null: no price is known."""
+    """Amount that `max_cost_usd` counts [US dollars], including failed attempts; a reply without
+    token counts counts at its highest possible cost. null: no price is known."""
     latency_s: Amount = 0.0
-    """Time of the successful request alone [s]."""
+    """Time of the successful request [s]."""
     provider_model: str = ""
-    """The model that the provider says it used."""
+    """The model that the provider reports."""
     attempts: Whole = 1
-    """Requests sent for it, 0 from the cache."""
+    """Number of requests sent for it; 0 from the cache."""
     cached: bool = False
     """True if it came from the cache."""
     seed_sent: bool = True
     """True if a seed was sent; if not, seeds are independent repeats."""
     batched: bool = False
-    """True if it came in a batch, at the price of one."""
+    """True if it came in a batch, at the batch price."""
 
     def storable(self) -> Self:
-        """Return the reply with all its fields, as it is written.
+        """Return the reply with all its fields, ready to be written.
 
-        It is paid for: an absurd number in it is one that is not known, and characters that no
-        file could hold become U+FFFD.
+        It is paid for, so nothing in it is an error: absurd numbers become unknown, and characters
+        that no file could hold become U+FFFD.
         """
         held, usage = vars(self), self.usage
         fields = {name: held[name] for name in Reply.model_fields}
@@ -197,7 +197,7 @@ class Reply(Line):
 
     @property
     def limit_usd(self) -> float:
-        """Amount that a limit counted for it, else its cost unless that was paid elsewhere."""
+        """Amount that a limit counted for it, else its cost, unless another run paid it."""
         if self.billed_usd is not None:
             return self.billed_usd
         return 0.0 if self.cached else self.cost_usd or 0.0
@@ -208,9 +208,9 @@ class StoredError(Line):
 
     kind: ErrorKind
     """`retryable`: every attempt failed; `sample`: this request cannot succeed; `refused`: by a
-    content policy; `unjudged`: there is a reply, but no engine could carry it out."""
+    content policy; `unjudged`: there is a reply, but no engine could execute it."""
     status: Whole | None = None
-    """HTTP status, where there was one."""
+    """HTTP status; null: none."""
     message: str = ""
     """Its message."""
     billed_usd: Usd | None = None
@@ -238,7 +238,7 @@ class SentPrompt(Line):
     version: str
     """Digest of the template."""
     messages: str
-    """Digest of the prompt as sent, which stands in `prompts.jsonl`."""
+    """Digest of the prompt as sent, which is in `prompts.jsonl`."""
     images: tuple[SentImage, ...] = ()
     """The pictures in the order sent."""
 
@@ -249,7 +249,7 @@ class Score(Line):
     criterion: str
     """The rule by which steps count."""
     matcher: str | None = None
-    """The rule that matches steps and goal blocks; null where the criterion leaves no choice."""
+    """The rule that matches steps and goal blocks; null: the criterion leaves no choice."""
     setting: str
     """`A`: with orientation; `B`: without."""
     tp: Whole
@@ -257,22 +257,22 @@ class Score(Line):
     fp: Whole
     """Wrong steps."""
     fn: Whole
-    """Blocks that are missing."""
+    """Missing blocks."""
     errors: dict[str, Whole] | None = None
-    """Wrong steps by type, where the criterion tells them apart."""
+    """Number of wrong steps by type; null: the criterion has no types."""
     placed: tuple[Whole | None, ...] | None = None
     """The goal block, from 0, that each step placed, or null."""
     why: tuple[str | None, ...] | None = None
     """The error type of each wrong step, null for right ones."""
     blocks: dict[str, Whole] | None = None
-    """Number of goal blocks by outcome, where the criterion tells them apart."""
+    """Number of goal blocks by outcome; null: the criterion has no outcomes."""
     kept: Whole | None = None
-    """Steps that the nearest valid order keeps."""
+    """Number of steps that the nearest valid order keeps."""
 
 
 class Course(NamedTuple):
-    """An assembly: each step by what it names, with its error type (None: it is right), and the
-    number of blocks of the goal that are missing at the end.
+    """An assembly: each step by its named candidate, with its error type (None: right), and the
+    number of goal blocks missing at the end.
     """
 
     steps: tuple[tuple[str, str | None], ...]
@@ -291,7 +291,7 @@ class AskedTurn(Line):
 
 
 class ShownScene(Line):
-    """The presentation of a scene, where it differs from the file."""
+    """The presentation of a scene that differs from the file."""
 
     order: tuple[Whole, ...]
     """The number in the file of each candidate, in the order shown."""
@@ -303,32 +303,32 @@ class Record(Line):
     """A sample's stored outcome."""
 
     sample: str
-    """`track/model/key/s<seed>`, and `/` with its `variant` where it has one; unique in the run."""
+    """`track/model/key/s<seed>`, and `/` with its `variant` if it has one; unique in the run."""
     track: str
-    """The track that asked."""
+    """The track."""
     model: str
-    """The model that was asked."""
+    """The model."""
     key: str
-    """Names the item in its track: the scene, or the question."""
+    """Name of the item in its track: the scene, or the question."""
     scene: str
-    """The scene that it is about."""
+    """The scene."""
     levels: tuple[Whole, ...]
     """Levels that the scene counts in."""
     parents: tuple[str, ...] = ()
     """Base scenes that the scene was made from."""
     n_blocks: Whole
-    """Blocks in the goal."""
+    """Number of blocks in the goal."""
     seed: Whole
-    """The repeat."""
+    """The seed."""
     outcome: Outcome
     """The outcome of the request."""
     reply: Reply | None
-    """The reply, null when there is none; of an episode, all its replies together."""
+    """The reply; null: none. For an episode, all its replies combined."""
     error: StoredError | None
-    """The error, null when there is none."""
+    """The error; null: none."""
     prompt: SentPrompt | None = None
-    """The prompt, null for recordings and baselines, which are sent nothing; of an episode, that of
-    the first turn."""
+    """The prompt; null for recordings and baselines, which get none. For an episode, that of the
+    first turn."""
     parse: Any = None
     """The parsed answer, in the form of its track; null: none."""
     scores: tuple[Score, ...]
@@ -336,22 +336,22 @@ class Record(Line):
     time: str = ""
     """Time when it was written, UTC."""
     run: str = ""
-    """Digest of the run that it belongs to."""
+    """Digest of its run."""
     shown: ShownScene | None = None
     """The presentation of the scene; null: as in the file."""
     asked: AskedAs | None = None
-    """Place where an answer in JSON was requested: only the `prompt`, or also the request's
+    """Place where a JSON answer was requested: only the `prompt`, or also the request's
     `response_format`; null: text was requested, or no model was called."""
     variant: dict[str, str] = Field(default_factory=dict)
     """Factors in which the condition differs from the run's reference, with their levels."""
     counts: dict[str, tuple[Amount, ...]] = Field(default_factory=dict)
-    """Counts of measures beside `scores`, by name."""
+    """Counts of measures besides `scores`, by name."""
 
     exported: ClassVar[Mapping[str, tuple[str, str]]] = {}
     """Columns that the track adds to exports, with their types in pandas and their fields."""
 
     def export_row(self) -> Mapping[str, Any]:
-        """The values of `exported`, None for a field of what is null."""
+        """The values of `exported`, None for missing ones."""
 
         def value(path: str) -> Any:
             found: Any = self
@@ -363,27 +363,27 @@ class Record(Line):
 
     @property
     def part(self) -> str | None:
-        """The part of its track that the item belongs to, as a subtask; None: there are none."""
+        """The item's part of its track, such as a subtask, or None."""
         return None
 
     @property
     def is_correct(self) -> bool | None:
-        """True if it is right, False if it is wrong, None where it can be in between."""
+        """True if it is right, False if it is wrong, None if there are degrees."""
         return None
 
     @property
     def target(self) -> str:
-        """The one right answer; "" where there is none."""
+        """The one right answer, or ""."""
         return ""
 
     @property
     def said(self) -> str | None:
-        """The answer that was read in the reply, in short."""
+        """The parsed answer, in short."""
         plan = getattr(self.parse, "plan", None)
         return None if plan is None else " ".join(map(str, plan))
 
     def course(self, matcher: str) -> Course | None:
-        """Return the steps of an assembly by a matcher, if it was scored by that; else None."""
+        """Return the steps of an assembly by a matcher, or None if it was not scored by it."""
         assemblies = [score for score in self.scores if score.why is not None]
         score = next(
             (one for one in assemblies if one.matcher == matcher), next(iter(assemblies), None)
@@ -395,7 +395,7 @@ class Record(Line):
 
     @property
     def asked_turns(self) -> tuple[AskedTurn, ...]:
-        """The requests of an episode; none for what is asked once."""
+        """The requests of an episode; empty for a single request."""
         return ()
 
     @property
@@ -405,7 +405,7 @@ class Record(Line):
 
     @property
     def item(self) -> str:
-        """The name of its item inside the track, as tables call it."""
+        """The name of its item in its track, as in tables."""
         return self.key
 
     @property
@@ -415,13 +415,13 @@ class Record(Line):
 
     @property
     def named(self) -> str:
-        """The id that its other fields make."""
+        """The id made from its other fields."""
         variant = f"/{self.way.key}" if self.variant else ""
         return f"{self.track}/{self.model}/{self.item}/s{self.seed}{variant}"
 
     @property
     def is_answered(self) -> bool:
-        """True if the model answered, if only by refusing; a recording may have no reply."""
+        """True if the model answered, even by refusing; a recording may have no reply."""
         return self.error is None or self.error.kind in ("refused", "unjudged")
 
     @property
@@ -431,18 +431,18 @@ class Record(Line):
 
     @property
     def is_final(self) -> bool:
-        """True if it is not asked again: answered, or an error that would come again."""
+        """True if it is not asked again: it has a reply, or an error that would recur."""
         return self.error is None or self.error.kind in ("refused", "sample", "unjudged")
 
     @property
     def replies(self) -> tuple[Reply, ...]:
-        """Every single reply in it."""
+        """All its single replies."""
         return () if self.reply is None else (self.reply,)
 
     @property
     def paid_usd(self) -> float | None:
-        """Cost of its replies to the run [US dollars]; None if a price is not known. Replies from
-        the cache were paid for elsewhere; an episode can hold both kinds.
+        """Cost of its replies to the run [US dollars]; None if a price is unknown. Replies from
+        the cache were paid for by other runs; an episode can hold both kinds.
         """
         paid = [reply.cost_usd for reply in self.replies if not reply.cached]
         known = [cost for cost in paid if cost is not None]
@@ -457,31 +457,31 @@ class Record(Line):
 
 
 class Call(Line):
-    """A call to a model: written before it is sent, and once more when it has ended."""
+    """A call to a model: written before it is sent, and again when it has ended."""
 
     call: Whole
     """Its number in the run, from 0."""
     model: str
-    """The model that is asked."""
+    """The model."""
     sample: str = ""
-    """The sample that it is made for."""
+    """The sample of the call."""
     key: str
-    """Digest of everything that decides the reply, as in the reply cache."""
+    """Digest of everything that determines the reply, as in the reply cache."""
     run: str
-    """Digest of the run that it belongs to."""
+    """Digest of its run."""
     most_usd: Usd | None = None
-    """The most that it can cost [US dollars], as far as known before it is sent; null: unknown."""
+    """The most that it can cost [US dollars], as estimated before it is sent; null: unknown."""
     ended: bool = False
-    """True when its end is known: a reply, or an error."""
+    """True if its end is known: a reply, or an error."""
     billed_usd: Usd | None = None
-    """Its cost [US dollars], or the highest possible where that is not known; null: the price is
+    """Its cost [US dollars], or the highest possible one if that is unknown; null: the price is
     unknown."""
     reply: Reply | None = None
-    """The reply as it arrived, before it was judged; null where none came."""
+    """The reply as it arrived, before it was judged; null: none."""
 
 
 class PictureMark(Line):
-    """Stands where a picture stood."""
+    """The mark of a picture in a message."""
 
     image: str
     """Label of the picture."""
@@ -500,7 +500,7 @@ class Prompt(Line):
     """A prompt as it was sent."""
 
     sha256: str
-    """Digest of the messages, by which records name it."""
+    """Digest of the messages, by which records refer to it."""
     messages: tuple[PromptMessage, ...]
     """The messages that were sent."""
 
@@ -509,12 +509,12 @@ class BatchLine(Line):
     """An event of a batch of requests; the first line of each is written before it is sent."""
 
     batch: str
-    """phyblock's name for it, which is sent to the provider so that it can be found there again."""
+    """phyblock's name for it, which is sent to the provider so that it can be found again."""
     model: str
     """Name of the model."""
     event: BatchEvent
-    """`intended`: it is about to be sent; `created`: the provider has it; `lost`: it has not, and
-    nothing was asked; `ended`: its answers are in `batches/`."""
+    """`intended`: it is about to be sent; `created`: the provider has it; `lost`: the provider does
+    not have it, and nothing was asked; `ended`: its answers are in `batches/`."""
     time: str
     """Time of the event, UTC."""
     id: str = ""
@@ -522,16 +522,16 @@ class BatchLine(Line):
     keys: tuple[str, ...] = ()
     """Requests of an intended batch in their order, by their keys in the reply cache."""
     most_usd: tuple[Usd, ...] = ()
-    """Most that each request of an intended batch can cost; empty where no price is known."""
+    """The most that each request of an intended batch can cost; empty: no price is known."""
     words: str = ""
-    """The reason why it was lost, or how it ended."""
+    """The reason why it was lost, or the state in which it ended."""
 
 
 class Stopped(Line):
-    """The reasons why the last session on a run did not finish; the file exists only while there
-    are any."""
+    """The reasons why the last session on a run did not finish; the file exists only if there are
+    any."""
 
     models: dict[str, str] = Field(default_factory=dict)
-    """The reason why a model was stopped, by its name."""
+    """The reasons why models were stopped, by name."""
     run: str = ""
     """The reason why the whole run was stopped; empty: it was not."""
