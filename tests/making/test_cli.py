@@ -40,7 +40,7 @@ scenes, vqa = partial(invoked, "scenes"), partial(invoked, "questions")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Three scenes that were made."""
     out = tmp_path_factory.mktemp("made") / "few"
-    done = scenes("generate", "--count", 3, "--levels", 2, "--seed", 9, *ALONE, "--out", out)
+    done = scenes("generate", "--count", 3, "--levels", 2, "--seed", 3, *ALONE, "--out", out)
     assert "3 scenes, all checks passed" in done.stdout
     with pytest.raises(StoreError, match="give another --out"):
         scenes("generate", "--out", out)
@@ -64,7 +64,7 @@ def test_what_is_made_is_verified_and_a_changed_scene_is_named(
 
 
 def test_processes_and_shards_make_the_same_files(folder: Path, tmp_path: Path) -> None:
-    words = ("generate", "--count", 3, "--levels", 2, "--seed", 9)
+    words = ("generate", "--count", 3, "--levels", 2, "--seed", 3)
     for number in (2, 1, 3):
         shard = ("--shard", f"{number}/3", *ALONE, "--out", tmp_path / "few")
         done = scenes(*words, *shard)
@@ -84,7 +84,7 @@ def test_processes_and_shards_make_the_same_files(folder: Path, tmp_path: Path) 
 
 
 def test_a_set_holds_nothing_of_those_that_it_excludes(folder: Path, tmp_path: Path) -> None:
-    words = ("generate", "--count", 3, "--levels", 2, "--seed", 9, *ALONE)
+    words = ("generate", "--count", 3, "--levels", 2, "--seed", 3, *ALONE)
     said = scenes(*words, "--exclude", folder, "--out", tmp_path / "other").stdout
     rejected = int(said.splitlines()[-1].split()[0])
     assert rejected >= 3
@@ -108,7 +108,7 @@ def test_a_season_is_made_again_from_what_was_revealed_and_from_nothing_else(
     tmp_path: Path,
 ) -> None:
     begin = ("commit", "--public", "round 7 of a beacon", "--out")
-    scenes(*begin, tmp_path, "--", "--count", 2, "--levels", 2)
+    scenes(*begin, tmp_path, "--", "--count", 1, "--levels", 3)
     commitment, secret = tmp_path / "commitment.json", tmp_path / "secret.txt"
     assert secret.read_text().strip() not in commitment.read_text()
     words = ("reveal", commitment, secret, "--public")
@@ -128,7 +128,7 @@ def test_a_season_is_made_again_from_what_was_revealed_and_from_nothing_else(
         with pytest.raises(click.UsageError, match=message):
             scenes(*begin, tmp_path / "bad", "--", *bad)
     text = commitment.read_text()
-    commitment.write_text(text.replace("--count 2", "--count 1 ; echo"))
+    commitment.write_text(text.replace("--count 1", "--count 1 ; echo"))
     with pytest.raises(click.UsageError, match="unexpected extra argument"):
         scenes(*words, "beacon 7")
     commitment.write_text(text)
@@ -201,14 +201,14 @@ def test_show_prints_the_facts(data: Path) -> None:
 
 def test_render_names_views_backgrounds_and_kinds(data: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    scenes("render", data, "t1", "--out", out, "--composite", "--gif")
+    scenes("render", data, "t1", *ALONE, "--out", out, "--composite", "--gif")
     stem = "t1-oblique-checkerboard"
     tails = (".png", "-composite.png", ".gif")
     assert {path.name for path in out.iterdir()} == {LIST, *(stem + tail for tail in tails)}
     for path in out.glob("t1*"):
         with Image.open(path) as image:
             assert image.format == path.suffix[1:].upper()
-    scenes("render", data, "t1", "--out", tmp_path / "all", "--view", "all")
+    scenes("render", data, "t1", *ALONE, "--out", tmp_path / "all", "--view", "all")
     assert len(list((tmp_path / "all").glob("*.png"))) == 4
 
 
