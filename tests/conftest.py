@@ -1,4 +1,4 @@
-"""Shared fixtures: where the official data is, if it is here; a browser for each module."""
+"""Shared fixtures: where the official data is, if it is here; workspaces."""
 
 from __future__ import annotations
 
@@ -8,17 +8,12 @@ import signal
 import sys
 from collections.abc import Generator, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import settings
 
-from tests.browser import chromium
 from tests.fork_server import ONE_THREAD, end_fork_server
 from tests.workspace import Workspace
-
-if TYPE_CHECKING:
-    from playwright.sync_api import Browser
 
 OFFICIAL_MISSING = (
     "official PhyBlock data not found: put it at ../shared or set PHYBLOCK_OFFICIAL to the folder "
@@ -93,13 +88,6 @@ def pictures_dir(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of rendered pictures of all workspaces of a test session, in all its processes."""
     base = tmp_path_factory.getbasetemp()
     return (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "pictures"
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    """A browser; its event loop runs while it does, so that it ends with its module."""
-    with chromium() as running:
-        yield running
 
 
 @pytest.fixture

@@ -1,12 +1,16 @@
-"""The public API: what a notebook may import, what it costs, and that the guide to it runs."""
+"""The public API: names, costs, the guide to it, and tasks, one by one, in any thread."""
 
 from __future__ import annotations
 
 import asyncio
+import itertools
+import pickle
 import re
 import subprocess
 import sys
 import typing
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from importlib.metadata import version
 from pathlib import Path
 
@@ -14,8 +18,12 @@ import pytest
 from PIL import Image
 
 import phyblock
+from phyblock.api import _distinct
 from phyblock.errors import SpecError
+from phyblock.records.files import read_manifest, run_records
+from phyblock.records.record import Record
 from phyblock.sim.engine import ENGINES
+from phyblock.tracks.pictures import Workshop
 from tests.workspace import Workspace
 
 NAMES = ["Episode", "PhyblockError", "Run", "Score", "Suite", "Task"]
@@ -125,3 +133,142 @@ def test_nothing_is_spent_unasked_and_a_loop_may_run(
 
     run = asyncio.run(in_a_notebook())
     assert set(run.records["outcome"]) == {"ok"}
+
+
+TRACKS = {"full_planning": "quick", "step_planning": "steps", "pose_planning": "pose", "vqa": "vqa"}
+JUDGED = ("parse", "scores", "counts", "outcome", "levels", "parents", "n_blocks")
+
+
+def judged(record: Record) -> dict[str, object]:
+    """Return what a judgement says, without what a run adds to it."""
+    fields = record.model_dump()
+    for turn in fields.get("turns", ()):
+        del turn["reply"]
+    own = ("pose", "answer", "ending", "outcomes", "progress", "turns", "question")
+    return {name: fields[name] for name in (*JUDGED, *own) if name in fields}
+
+
+@pytest.mark.parametrize("track", TRACKS)
+def test_a_reply_is_worth_what_it_is_in_a_run(track: str, tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    phyblock.run_suite(TRACKS[track], models=["random"], limit=4, out=folder)
+    records = [one for _, one in run_records(folder, read_manifest(folder))]
+    for seed, of_seed in itertools.groupby(records, lambda one: one.seed):
+        found = phyblock.tasks(track, seed=seed, limit=4)
+        for record in of_seed:
+            replies = [one.text for one in record.replies]
+            score = found[record.item].score(replies if found[0].plays else replies[0])
+            assert judged(score.record) == judged(record)
+
+
+@pytest.mark.parametrize("track", TRACKS)
+def test_a_task_asks_as_a_run_does(track: str) -> None:
+    found = phyblock.tasks(track, limit=2)
+    shop = Workshop()
+    try:
+        for task in found:
+            opened = type(task.track)(found.suite, task.track.dataset, 2, shop)
+            if task.plays:
+                asked = opened.start(task.item, 0, {}, with_messages=True).request()
+            else:
+                asked = opened.request(task.item, 0, {}, with_messages=True)
+            request = asyncio.run(asked)
+            assert request is not None
+            assert task.request().messages == request.messages
+            assert task.messages()[-1]["role"] == "user"
+            assert len(task.pictures) == str(task.messages()).count("data:image/png;base64,")
+    finally:
+        shop.close()
+
+
+def test_the_rewards_of_an_episode_sum_to_its_score() -> None:
+    task = phyblock.tasks("step_planning", "candidates.order=file", limit=2)[0]
+    replies = ["Next plan: Move(1)", "I do not know.", *["Next plan: Move(2)"] * 40]
+    episode, total, said = task.episode(), 0.0, 0
+    while not episode.done:
+        turn = episode.step(replies[said])
+        total, said = total + turn.reward, said + 1
+    score = task.score(replies)
+    assert total == pytest.approx(score.value)
+    assert episode.score().value == score.value
+    assert score.errors == {"no_move": 1, "overflow": 3}
+    with pytest.raises(SpecError, match="has ended"):
+        episode.step("Next plan: Done")
+    assert episode.reset() == task.messages()
+    with pytest.raises(SpecError, match="is asked once"):
+        phyblock.tasks("full_planning", limit=1)[0].episode()
+
+
+def test_threads_and_processes_share_nothing() -> None:
+    found = phyblock.tasks("full_planning", "images.size_px=128", levels=[1, 2], limit=6)
+    reply = "Step1: Move block with index 1\nStep2: Move block with index 2"
+
+    def both(n: int) -> tuple[float, str]:
+        task = found[n % len(found)]
+        return task.score(reply).value, str(task.messages())
+
+    alone = [both(n) for n in range(len(found))]
+    with ThreadPoolExecutor(8) as pool:
+        assert list(pool.map(both, range(48))) == alone * 8
+    score = found[0].score(reply)
+    assert pickle.loads(pickle.dumps(score)) == score
+
+
+def test_streams_hold_no_scene_of_the_test_set_and_begin_anywhere() -> None:
+    stream = phyblock.tasks("full_planning", split="train", levels=[1, 2], seed=5)
+    first = list(itertools.islice(stream, 3))
+    again = list(itertools.islice(stream, 3))
+    assert [one.key for one in first] == [one.key for one in again]
+    later = phyblock.tasks("full_planning", split="train", levels=[1, 2], seed=5, first=2)
+    assert next(iter(later)).key == first[2].key
+    assert not {one.key for one in first} & {one.key for one in phyblock.tasks("full_planning")}
+    dev = phyblock.tasks("pose_planning", split="dev", levels=[1], seed=5, limit=1)
+    assert len(dev) == 1
+    assert not phyblock.verify(dev[0].item)
+    assert first[0].score(None).outcome == "missing"
+    with pytest.raises(TypeError, match="give a limit"):
+        len(stream)
+
+
+def test_finite_sets_hold_each_scene_once_and_have_slices() -> None:
+    stream = phyblock.tasks("full_planning", split="train", levels=[1], seed=1)
+    drawn = [one.key for one in itertools.islice(stream, 3)]
+    assert drawn[2] == drawn[0], "the scene comes again"
+    assert stream[1].key == drawn[1]
+    finite = phyblock.tasks("full_planning", split="train", levels=[1], seed=1, limit=3)
+    assert [one.key for one in finite][:2] == drawn[:2]
+    assert len(finite) == 3
+    assert [one.key for one in finite[1:]] == [finite[1].key, finite[2].key]
+    with pytest.raises(SpecError, match="give 1 scenes"):
+        _distinct(itertools.repeat(finite[0].track.dataset.tasks[0]), 2)
+
+
+def test_what_is_wrong_with_tasks_and_replies_is_named() -> None:
+    finite = phyblock.tasks("full_planning", limit=1)
+    stream = phyblock.tasks("full_planning", split="train")
+    scene = finite[0].track.dataset.tasks[0]
+    steps = phyblock.tasks("step_planning", limit=1)[0]
+    wrong: dict[str, Callable[[], object]] = {
+        "first: is the place": lambda: phyblock.tasks("full_planning", first=1),
+        "found: 2": lambda: phyblock.tasks("full_planning", split="dev", limit=1, first=2),
+        "data: is no data": lambda: phyblock.tasks("full_planning", data=5),  # type: ignore[arg-type]
+        "data[0]: is no scene": lambda: phyblock.tasks("full_planning", data=[1]),  # type: ignore[list-item]
+        "data[1]: comes a second": lambda: phyblock.tasks("full_planning", data=[scene, scene]),
+        "tracks: does not go": lambda: phyblock.tasks("full_planning", "tracks=[vqa]"),
+        'split="test", vqa.path': lambda: phyblock.tasks("vqa", split="train"),
+        "takes texts": lambda: steps.episode().step(None),  # type: ignore[arg-type]
+        "reply: cannot be scored": lambda: steps.score(5),  # type: ignore[arg-type]
+        "by place": lambda: stream[:2],
+        "found: -1": lambda: stream[-1],
+        "found: None": lambda: finite[None],  # type: ignore[call-overload]
+    }
+    for said, call in wrong.items():
+        with pytest.raises(SpecError, match=re.escape(said)):
+            call()
+
+
+def test_answers_can_be_asked_for_as_json() -> None:
+    (task,) = phyblock.tasks("vqa", "answer_format=json_schema", "vqa.subtasks=[SH]", limit=1)
+    assert task.answer_schema is not None
+    assert task.answer_schema["required"] == ["reasoning", "answer"]
+    assert phyblock.tasks("vqa", limit=1)[0].answer_schema is None

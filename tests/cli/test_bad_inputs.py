@@ -4,17 +4,326 @@ from __future__ import annotations
 
 import re
 import shutil
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
 from phyblock.cli.main import show_problems
 from phyblock.errors import InputError, Problem
-from tests.cli.bad_inputs import BAD, Bad
-from tests.cli.breakage import FAKE_KEY
+from tests.cli.breakage import (
+    FAKE_KEY,
+    FRESH,
+    RUN,
+    Prepare,
+    after,
+    broken_record,
+    changed_colors,
+    checkout,
+    command,
+    file,
+    file_in_the_way,
+    foreign_cache,
+    lines,
+    manifest_without,
+    many_files,
+    models_text,
+    noise,
+    options,
+    pipe,
+    png,
+    recording,
+    scenes_text,
+    second_scene,
+    suite_line,
+    suite_text,
+    template,
+    template_alone,
+    user_block,
+    without_field,
+)
+from tests.fuzz.strategies import png_header
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Workspace, tower
+
+EPS = b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 90 90\nshowpage\n"
+LONG = "x" * 5_000
+NOWHERE = "127.0.0.1:9"
+CACHED = (*FRESH, "--models", "alpha")
+
+
+@dataclass(frozen=True)
+class Bad:
+    """A bad input.
+
+    `prepare` breaks something and gives the command line; `says` are parts that each message, or
+    the only one, must hold; `messages` how many problems there are; `writes` the files that may
+    have appeared or grown; `bytes_left` the size that no file may pass.
+    """
+
+    name: str
+    prepare: Prepare
+    says: tuple[str, ...]
+    messages: int = 1
+    env: tuple[tuple[str, str], ...] = ()
+    writes: tuple[str, ...] = ()
+    bytes_left: int | None = None
+
+
+SUITES: tuple[Bad, ...] = (
+    Bad("key", suite_line("sede: [1]"), ("suite.yaml:4:1: sede", "did you mean seeds?", "allowed")),
+    Bad("inner-key", suite_line("limits: {max_cost: 1}"), ("suite.yaml:4:10: limits.max_cost",)),
+    Bad("type", suite_line("seeds: five"), ("suite.yaml:4:8: seeds", 'found: "five"', "list")),
+    Bad("no-name", suite_text("models: [random]\n"), ("suite.yaml", "name: is missing")),
+    Bad("no-models", suite_text("name: trial\n"), ("suite.yaml", "models: is missing")),
+    Bad("nan", suite_line("sampling: {temperature: .nan}"), ("suite.yaml:4:", "temperature")),
+    Bad("yaml", suite_line("seeds: [1, 2"), ("suite.yaml:",)),
+    Bad(
+        "key-twice", suite_text("name: a\nmodels: [random]\nname: b\n"), ("suite.yaml:3:1", "name")
+    ),
+    Bad("empty", suite_text(""), ("suite.yaml: is empty",)),
+    Bad("tab", suite_text("name: trial\n\tmodels: [random]\n"), ("suite.yaml:2:1",)),
+    Bad("level", suite_line("levels: [1, 6]"), ("suite.yaml:4:13: levels[1]", "1, 2, 3, 4, 5")),
+    Bad("model", suite_line("models: [alpah]"), ("suite.yaml:3:10: models[0]", "mean alpha?")),
+    Bad("no-list", suite_line("models: random"), ("suite.yaml:3:9: models", "[random]")),
+    Bad("range", suite_line("levels: 1-4"), ("suite.yaml:4:9: levels", "[1, 2, 3, 4]")),
+    Bad("count", suite_line("seeds: 3"), ("suite.yaml:4:8: seeds", "[0, 1, 2]")),
+    Bad("no-folder", suite_line("dataset: {path: ./dta}"), ("suite.yaml:3:", "no such folder")),
+    Bad("no-set", suite_line("dataset: {path: mini}"), ("suite.yaml:3:", "bundled", "phyblock-")),
+    Bad("no-path", suite_line("dataset: {format: official}"), ("dataset.path", "--set")),
+    Bad("no-samples", suite_line("dataset: {path: ./low}\nlevels: [4]"), ("no samples", "1, 2")),
+    Bad("variable", suite_line("dataset: {path: $NOWHERE/x}"), ("dataset.path", "NOWHERE")),
+    Bad("absent", command("run", "quik"), ("quik: ", "allowed: ", "did you mean quick?")),
+    Bad("folder", command("run", "data"), ("data: there is no such suite file",)),
+)
+OPTIONS: tuple[Bad, ...] = (
+    Bad("set-key", options("--set", "limits.max=1"), ("--set limits.max=1: limits.max", "allowed")),
+    Bad("set-value", options("--set", "seeds=x"), ("--set seeds=x: seeds", 'found: "x"')),
+    Bad("set-form", options("--set", "seeds"), ("--set seeds", "key=value")),
+    Bad("set-yaml", options("--set", "seeds=[1"), ("--set seeds=[1",)),
+    Bad("set-unquoted", options("--set", "seeds=[0,", "1]"), ("1]", "quote values with spaces")),
+    Bad("set-mapping", options("--set", "sampling={top_p:", "1}"), ("quote values with spaces",)),
+    Bad("set-words", options("--set", "name=my", "trial"), ("quote values with spaces",)),
+    Bad("set-spaced", options("--set", "seeds", "=", "0"), ("quote values with spaces",)),
+    Bad("set-half", options("--set", "seeds=[0,"), ("--set seeds=[0,", "quote values with spaces")),
+    Bad("models-spaced", options("--models", "alpha,", "random"), ("quote values with spaces",)),
+    Bad("field", options("--seeds", "0,1"), ("are set with --set 'seeds=[...]'",)),
+    Bad("field-word", options("--answer-format", "x"), ("with --set answer_format=VALUE",)),
+    Bad("models-empty", options("--models", "oracle,,random"), ("holds an empty name",)),
+    Bad(
+        "plugin",
+        command("--plugin", "no_such", "models"),
+        ("--plugin: cannot be imported: ModuleNotFoundError",),
+    ),
+    Bad("prompt-run", template_alone("run"), ("mine.j2: is a prompt, not a suite", "hint: name")),
+    Bad("prompt-validate", template_alone("validate"), ("mine.j2: is a prompt, not a suite",)),
+    Bad("models", options("--models", "oracel"), ("--models", "found: oracel", "mean oracle?")),
+    Bad("no-file", options("--models-file", "gone.yaml"), ("gone.yaml", "no such models file")),
+    Bad("limit", options("--limit", "0"), ("--limit", "0 is not in the range")),
+    Bad("limit-word", options("--limit", "few"), ("--limit", "few")),
+    Bad("verb", command("rum"), ("rum", "run")),
+    Bad("check", command("models", "check", "alpah"), ("alpah", "did you mean alpha?")),
+    Bad("validate", many_files, (), messages=3),
+    Bad("validate-pipe", pipe("p.yaml", "validate", "p.yaml"), ("p.yaml: there is no such suite",)),
+    Bad("validate-device", command("validate", "/dev/zero"), ("/dev/zero: there is no such",)),
+    # A file that is there and cannot be read, for root too.
+    Bad("validate-locked", command("validate", "/proc/self/mem"), ("mem: cannot be read: ",)),
+    Bad(
+        "validate-noise",
+        noise("n.yaml", "validate", "n.yaml"),
+        ("read: is larger than",),
+    ),
+    Bad(
+        "validate-data",
+        pipe("data/scenes.jsonl", "validate", "data"),
+        ("is not a regular file",),
+    ),
+    Bad(
+        "validate-lines",
+        noise("data/scenes.jsonl", "validate", "data"),
+        ("holds no scenes",),
+    ),
+    Bad("validate-long", command("validate", LONG), (LONG[:80], "there is no such suite")),
+    Bad("run-long", command("run", "suite.yaml", "--models-file", LONG), ("no such models file",)),
+    Bad("report-long", command("report", LONG), (LONG[:80],)),
+    Bad("show-long", command("scenes", "show", LONG, "t1"), (LONG[:80],)),
+    Bad(
+        "set-long",
+        options("--set", "seeds=[0x" + "f" * 90_000 + "]"),
+        ("seeds[0]: is too large a number",),
+    ),
+    Bad("set-deep", options("--set", "a." * 9_000 + "a=1"), ("key=value",)),
+    Bad("init", command("init", "."), ("models.yaml", "is already there")),
+)
+DATA: tuple[Bad, ...] = (
+    Bad("cycle", second_scene("blocks.0.depend", [2]), ("scenes.jsonl:2: ", "cycle", "1 -> 2")),
+    Bad("dangling", second_scene("blocks.1.depend", [7]), ("scenes.jsonl:2: ", "found: 7")),
+    Bad("nan-m", second_scene("blocks.1.position", [0, 0, float("nan")]), ("jsonl:2:", "NaN")),
+    Bad("far", second_scene("blocks.1.position", [0, 0, -1e308]),
+        ("jsonl:2: blocks[1].position[2]: is out of range", "at least -100")),
+    Bad("kind", second_scene("blocks.0.type", "cub"), ("jsonl:2: blocks[0].type", "cube, cuboid1")),
+    Bad("layer", second_scene("blocks.1.layer", 1), ("jsonl:2: blocks[1].layer", "found: 1")),
+    Bad("lost", second_scene("candidates", [tower("t", [1], ("red",))["candidates"][0]]),
+        ("jsonl:2: candidates", "block 2")),
+    Bad("json", scenes_text(lambda lines: [*lines[:3], "{", *lines[4:]]), ("scenes.jsonl:4:",)),
+    Bad("twice", scenes_text(lambda lines: [*lines, lines[0]]),
+        ("scenes.jsonl:6: id", "scenes.jsonl:1 already")),
+    Bad("none", scenes_text(lambda _: []), ("scenes.jsonl", "holds no scenes")),
+    Bad("no-png", checkout(None), ("official", "images.source", "found: 000", "render")),
+    Bad("bad-png", checkout(b"no picture"), ("000.png", "is no picture")),
+    Bad("eps", checkout(EPS), ("000.png", "is no picture", "PNG, JPEG, GIF or WebP")),
+    Bad("dot-png", checkout(png((1, 1))), ("000.png", "found: 1 x 1 pixels", "10,000 pixels")),
+    Bad("huge-png", checkout(png_header(30_000, 30_000)), ("000.png", "900000000 pixels")),
+    Bad("cut-png", checkout(png()[:-40]), ("000.png", "is not a readable picture")),
+)  # fmt: skip
+MODELS: tuple[Bad, ...] = (
+    Bad("no-rule", options("--models", "repeat"), ("repeat", "has no rule for full_planning")),
+    Bad("engine", command(*FRESH, "--models", "random", "--set", "tracks=[step_planning]"),
+        ("PHYBLOCK_PHYSICS: is not known", "found: bullet", "allowed: "),
+        env=(("PHYBLOCK_PHYSICS", "bullet"),)),
+    Bad("drawn-goal", lambda here: [*checkout(png())(here), "--set", "tracks=[step_planning]"],
+        ("step_planning draws its own pictures", "images.source=render")),
+    Bad("two-addresses",
+        file("models.yaml", "".join(
+            f"{name}: {{id: hosted_vllm/m, api_base: 'http://127.0.0.1:{port}/v1'}}\n"
+            for name, port in (("alpha", 9), ("beta", 10))
+        ), *FRESH, "--models", "alpha,beta"), ("beta: api_base: is alpha at another address",)),
+    Bad("batched-steps",
+        file("models.yaml",
+             "m: {id: openai/gpt-4o, api_base: 'http://127.0.0.1:9/v1', batch: true}\n",
+             *FRESH, "--models", "m", "--set", "tracks=[step_planning]"),
+        ("is asked in batches, and step_planning plays episodes of several turns",)),
+    Bad("jinja", template("{% block user %}{{ "), ("mine.j2:1", "is not valid Jinja")),
+    Bad("undefined", template(user_block("{{ solution }}")),
+        ("mine.j2:2: ", "block user", "solution", "n_candidates"), writes=("fresh",)),
+    Bad("jinja-type", template(user_block("{{ n_candidates + 'x' }}")),
+        ("mine.j2:2: ", "unsupported operand"), writes=("fresh",)),
+    Bad("jinja-loader", template(user_block("{% include 'x' %}")),
+        ("mine.j2:2: ", "loader"), writes=("fresh",)),
+    Bad("jinja-sandbox", template(user_block("{{ pictures.__class__.__mro__ }}")),
+        ("mine.j2:2: ", "unsafe"), writes=("fresh",)),
+    Bad("jinja-lipsum", template(user_block("{{ lipsum(9) }}")),
+        ("mine.j2:2: ", "'lipsum' is undefined"), writes=("fresh",)),
+    Bad("jinja-pipe", pipe("mine.j2", *FRESH, "--set", "prompt=mine.j2"), ("no such file",)),
+    Bad("hex", models_text("a:\n  id: openai/x\n  extra_body: {k: 0x" + "f" * 90_000 + "}\n"),
+        ("models.yaml:3:19: a.extra_body.k: is too large a number", "90,002 digits")),
+    Bad("infinite", models_text("a:\n  id: openai/x\n  extra_body: {k: [1e999]}\n"),
+        ("models.yaml:3:19: a.extra_body.k: cannot be sent as JSON", "numbers that are finite")),
+    Bad("no-user", template("Build it."), ("mine.j2", "has no user block")),
+    Bad("no-template", template(None), ("suite.yaml", "prompt", "no such file")),
+    Bad("secret", models_text(f"mine:\n  id: openai/x\n  api_key: {FAKE_KEY}\n"),
+        ("models.yaml:3:", "mine.api_key", "api_key_env")),
+    Bad("model-twice", models_text("a: openai/x\nb: openai/x\na: openai/y\n"),
+        ("models.yaml:3:1", "a")),
+    Bad("no-provider", models_text("mine: gpt-4o\n"), ("models.yaml:1:7", "openai/gpt-4o?")),
+    Bad("no-known-provider", models_text(f"alpha: {{id: Qwen/x, api_base: 'http://{NOWHERE}/v1'}}\n"),
+        ("model alpha", "is of no provider that is known", "hosted_vllm/Qwen/x")),
+    Bad("builtin", models_text("oracle: openai/x\n"), ("models.yaml:1:1: oracle",)),
+    Bad("no-key", models_text("alpha: openai/gpt-4o\n"),
+        ("alpha", "OPENAI_API_KEY", "--models")),
+    Bad("no-price", command(*FRESH, "--models", "alpha", "--set", "limits.max_cost_usd=1"),
+        ("model alpha: price", "max_cost_usd", "models.yaml"), writes=("fresh",)),
+    Bad("no-recording", recording(None), ("model old", "recordings not found", "replies"),
+        writes=("fresh",)),
+    Bad("strange-reply", recording('{"speech": 1}'), ("t1.json", "speech"), writes=("fresh",)),
+    Bad("no-json", recording('{"text": '), ("t1.json:1:10", "is not JSON"), writes=("fresh",)),
+)  # fmt: skip
+FOLDERS: tuple[Bad, ...] = (
+    Bad("below-file", file_in_the_way("run", "suite.yaml", "--out", "taken/x"),
+        ("taken/x", "cannot be written: Not a directory", "--out")),
+    Bad("is-file", file_in_the_way("run", "suite.yaml", "--out", "taken"),
+        ("taken", "cannot be written", "--out")),
+    Bad("long-name", command("run", "suite.yaml", "--out", "x" * 300),
+        ("cannot be written: File name too long", "--out")),
+    Bad("long-name-dry", command("run", "suite.yaml", "--out", "x" * 300, "--dry-run"),
+        ("cannot be written: File name too long", "--out")),
+    Bad("long-run", command("report", "x" * 300), ("File name too long",)),
+    Bad("long-init", command("init", "x" * 300), ("cannot be written: File name too long",)),
+    Bad("not-utf-8", command("report", "taken\udcff"), ("taken\\udcff: holds no run.yaml",)),
+    Bad("not-utf-8-out", file_in_the_way("run", "suite.yaml", "--out", "taken/\udcff"),
+        ("taken/\\udcff: cannot be written", "--out")),
+    Bad("empty-out", command("run", "suite.yaml", "--out", ""), ("--out", "empty")),
+    Bad("stranger", file_in_the_way("run", "suite.yaml", "--out", "."),
+        (".: is not empty and holds no run", "found: ", "--out")),
+    Bad("proc", command("run", "suite.yaml", "--out", "/proc/here"), ("/proc/here", "--out")),
+    Bad("other-run", command(*RUN, "--set", "levels=[4]"),
+        ("out: holds another run", "found: different: suite.levels ")),
+    Bad("dry-other-run", command(*RUN, "--set", "levels=[4]", "--dry-run"),
+        ("out: holds another run", "found: different: suite.levels ")),
+    Bad("manifest", file("out/run.yaml", "identity: [1", *RUN),
+        ("out/run.yaml:1:13: is not a run manifest", "from a copy")),
+    Bad("no-manifest", file("out/run.yaml", "other: 1\n", *RUN), ("out/run.yaml", "identity")),
+    Bad("record", broken_record(lambda line: line[:40]), ("out/records.jsonl:2:41: ", "hint: ")),
+    Bad("record-field", broken_record(without_field("outcome")),
+        ("out/records.jsonl:2: outcome",)),
+    Bad("record-reply", broken_record(without_field("reply")), ("out/records.jsonl:2", "reply")),
+    Bad("record-report", broken_record(without_field("scores"), "report", "out"),
+        ("out/records.jsonl:2", "scores")),
+    Bad("record-counts", broken_record(lambda line: line.replace('"tp":', '"tq":', 1)),
+        ("out/records.jsonl:2", "scores[0].tp")),
+    Bad("record-score", broken_record(without_field("n_blocks"), "score", "out"),
+        ("out/records.jsonl:2", "n_blocks")),
+    Bad("record-nan", broken_record(lambda line: line.replace('"tp":', '"tp":NaN,"tq":', 1),
+        "report", "out", "--print"), ("out/records.jsonl:2: ", "NaN")),
+    Bad("record-huge", broken_record(lambda line: line.replace('"tp":', f'"tp":{10**30},"tq":', 1),
+        "export", "out", "--to", "csv"), ("out/records.jsonl:2: scores[0].tp", "out of range")),
+    Bad("record-deep", broken_record(lambda line: f'{line[:-1]},"x":{"[" * 5000}{"]" * 5000}}}',
+        "compare", "out"), ("out/records.jsonl:2: ", "nested")),
+    Bad("record-foreign", broken_record(lambda line: line.replace('"run":"', '"run":"0', 1)),
+        ("out/records.jsonl:2: run: is of another run", "hint: ")),
+    Bad("record-foreign-episode",
+        broken_record(lambda line: line.replace('"run":"', '"run":"0', 1), "show", "out", "t1"),
+        ("out/records.jsonl:2: run: is of another run",)),
+    Bad("record-blank", broken_record(lambda _: "", "report", "out"), ("out/records.jsonl:2",)),
+    Bad("manifest-report", manifest_without("suite", "report", "out"),
+        ("out/run.yaml: suite.name", "suite.models"), 2),
+    Bad("manifest-score", manifest_without("suite", "score", "out"),
+        ("out/run.yaml: suite.name", "suite.models"), 2),
+    Bad("manifest-data", manifest_without("dataset", "score", "out"), ("out/run.yaml", "dataset")),
+    Bad("show-none", command("show", "out", "no-such"), ("no-such", "holds no such sample")),
+    Bad("show-several", command("show", "out", "random"), ("holds 5 such samples", "allowed: ")),
+    Bad("no-run", command("report", "data"), ("data: holds no run.yaml",)),
+    Bad("nothing", command("report", "nowhere"), ("nowhere", "phyblock run")),
+    Bad("score-file", command("score", "suite.yaml"), ("suite.yaml", "phyblock run")),
+    Bad("orphans", after(lambda made: (made.out / "run.yaml").unlink(), *RUN),
+        ("out: is not empty and holds no run", "no run.yaml", "--out")),
+    Bad("changed-data", lines("data/scenes.jsonl", changed_colors, "score", "out"),
+        ("data: sha256: is not the data set", "found", "allowed")),
+    Bad("lost-data", after(lambda made: (made.root / "data").rename(made.root / "moved"),
+        "score", "out"),
+        ("data: ", "is not there", "--data")),
+    Bad("full-disk", command(*FRESH, "--no-cache", "--models", "random,oracle"),
+        ("fresh/records.jsonl", "cannot be written: File too large", "it goes on from here"),
+        writes=("fresh",), bytes_left=6000),
+    Bad("full-at-once", command("run", "suite.yaml", "--out", "fresh"),
+        ("fresh", "cannot be written"), writes=("fresh",), bytes_left=100),
+    Bad("full-tables", command("report", "out"), ("out", "cannot be written"),
+        writes=("out/tables",), bytes_left=100),
+    Bad("full-records", command("score", "out"), ("out/records.jsonl", "cannot be written"),
+        bytes_left=100),
+    Bad("full-init", command("init", "new"), ("new", "cannot be written"),
+        writes=("new",), bytes_left=100),
+)  # fmt: skip
+CACHES: tuple[Bad, ...] = (
+    Bad("broken-cache", file("cache/replies.sqlite", b"not a database" * 40, *CACHED),
+        ("replies.sqlite", "hint: "),
+        writes=("fresh",)),
+    Bad("foreign-cache", after(foreign_cache, *CACHED),
+        ("replies.sqlite", "another version", "hint: "),
+        writes=("fresh",)),
+    Bad("broken-stats", file("cache/replies.sqlite", b"not a database" * 40, "cache", "stats"),
+        ("replies.sqlite",)),
+    Bad("full-cache", command(*FRESH, "--models", "alpha", "--set", "seeds=[1]"),
+        ("replies.sqlite", "cannot be used: disk I/O error", "free some space"),
+        writes=("fresh", "cache/replies.sqlite-"), bytes_left=6000),
+    Bad("no-pictures", file("c2/pictures", "mine", *CACHED),
+        ("c2/pictures", "cannot be written", "PHYBLOCK_CACHE"),
+        env=(("PHYBLOCK_CACHE", "c2"),), writes=("fresh", "c2/goal-blind", "c2/replies.sqlite")),
+    Bad("cache-below", file_in_the_way("run", "suite.yaml", "--out", "fresh", "--models", "alpha"),
+        ("taken/x", "PHYBLOCK_CACHE"), env=(("PHYBLOCK_CACHE", "taken/x"),), writes=("fresh",)),
+)  # fmt: skip
+BAD: tuple[Bad, ...] = SUITES + OPTIONS + DATA + MODELS + FOLDERS + CACHES
 
 
 @pytest.fixture(scope="module")

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.domain.scene import AOVGraph, CycleError
-from tests.domain.graphs import Edges, acyclic, any_edges
+from tests.scoring.cases import Edges, acyclic, any_edges
 
 SEEDS = st.integers(0, 2**32 - 1)
 

@@ -30,8 +30,8 @@ from phyblock.sim.contact import GROUND
 from phyblock.sim.dynamics import Trial
 from phyblock.sim.engine import Physics
 from phyblock.workers import open_workers
-from tests.designs import built, designed_scene
 from tests.shipped import DATA, TASKS, official_tasks
+from tests.sim.structures import built, designed_scene
 from tests.sim.test_geometry import FLOATING, OVERLAPPING
 
 BUILT_IN = DATA / "phyblock-400"

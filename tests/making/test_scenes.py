@@ -220,9 +220,7 @@ def test_splits_share_no_scene_with_one_another_or_with_the_built_in_set() -> No
     assert colorless(other.scene.blocks) not in forms["train"]
 
 
-@pytest.mark.parametrize(
-    ("count", "jobs"), [(20, 1), pytest.param(200, 2, marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize(("count", "jobs"), [(20, 1), pytest.param(200, 2, marks=pytest.mark.slow)])
 def test_no_generated_scene_has_a_form_of_the_built_in_set(count: int, jobs: int) -> None:
     with open_workers(jobs) as workers:
         production = Production(3, "kit", workers, builtin_forms())

@@ -17,7 +17,7 @@ from phyblock.parsing.plan import parse_plan
 from phyblock.records.files import read_manifest
 from phyblock.registry import known_tracks
 from phyblock.run import manifest, rescore, store
-from tests.run.test_step_runs import by_sample
+from tests.run.test_track_runs import by_sample
 from tests.servers.chassis import Faults, Running, Seen
 from tests.servers.step_agent import StepAgent
 from tests.workspace import Raw, Workspace, call

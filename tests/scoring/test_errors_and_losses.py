@@ -27,8 +27,7 @@ from phyblock.scoring.plan import (
     steps_kept,
 )
 from phyblock.types import LEVEL1_CRITERIA, MATCHERS, SETTINGS, Matcher, Setting
-from tests.domain.graphs import acyclic
-from tests.scoring.cases import FLAT, TURNED, Case, carriers, cases, equal, renumbered
+from tests.scoring.cases import FLAT, TURNED, Case, acyclic, carriers, cases, equal, renumbered
 
 
 def errors_of(case: Case, setting: Setting, matcher: Matcher) -> tuple[ErrorType | None, ...]:

@@ -1,11 +1,16 @@
-"""Balance by statics: where it can be worked out by hand, and where a simulation says the same."""
+"""Balance by statics: by hand, against simulations, and with proofs that nothing changed passes."""
 
 from __future__ import annotations
 
+import ast
 import math
-from collections.abc import Iterator
+import sys
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing
 from dataclasses import replace
+from itertools import product
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +20,7 @@ from numpy.typing import NDArray
 
 from phyblock.domain.blocks import SHAPES, BlockType
 from phyblock.domain.scene import Block
-from phyblock.sim import balance
+from phyblock.sim import balance, certificate
 from phyblock.sim.balance import (
     FRICTIONS,
     MARGIN_M,
@@ -25,6 +30,7 @@ from phyblock.sim.balance import (
     surely_falls,
     surely_stands,
 )
+from phyblock.sim.certificate import ONE, Falls, Stands, proves
 from phyblock.sim.contact import drop_height_m
 from phyblock.sim.dynamics import ONE_SETTING, Site, groups
 from phyblock.sim.engine import installed_engines, physics_engine
@@ -189,3 +195,94 @@ def test_a_wedge_on_two_ridges_surely_stands_where_it_covers_them(name: str, sta
 def test_what_the_data_set_holds_stands() -> None:
     for blocks in list(SCENES.values())[::80]:
         assert all(is_balanced(group) for group in groups(blocks))
+
+
+STANDING = prove([*tower(1), block(2, "cuboid3", (0, 0, 0.0625), (0, 0, 90))])
+FALLING = prove([*tower(1), block(2, "cuboid2", (0.06, 0, 0.0625))])
+
+
+def put(value: Any, path: tuple[int, ...], change: Callable[[int], int]) -> Any:
+    """Nested tuples with the number at a path changed."""
+    if not path:
+        return change(value)
+    parts = [
+        put(part, path[1:], change) if at == path[0] else part for at, part in enumerate(value)
+    ]
+    return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)
+
+
+def numbers(value: Any, path: tuple[int, ...] = ()) -> Iterator[tuple[int, ...]]:
+    """The path of each number in nested tuples."""
+    if not isinstance(value, tuple):
+        yield path
+    else:
+        for at, part in enumerate(value):
+            yield from numbers(part, (*path, at))
+
+
+def test_a_proof_holds_for_what_it_was_found_for_alone() -> None:
+    assert STANDING is not None
+    assert FALLING is not None
+    assert (STANDING.stands, FALLING.stands) == (True, False)
+    assert isinstance(STANDING.proof, Stands)
+    assert isinstance(FALLING.proof, Falls)
+    assert proves(STANDING.proof, STANDING.structure)
+    assert proves(FALLING.proof, FALLING.structure)
+    assert not proves(STANDING.proof, FALLING.structure)
+    assert not proves(FALLING.proof, STANDING.structure)
+
+
+def test_a_proof_with_any_force_changed_or_left_out_is_refused() -> None:
+    assert STANDING is not None
+    paths = list(numbers(STANDING.proof))
+    for path in paths[:: max(1, len(paths) // 150)]:
+        for by in (ONE // 10**4, -ONE // 10**4):
+            wrong = put(STANDING.proof, path, lambda number, by=by: number + by)
+            assert not proves(wrong, STANDING.structure)
+    forces = STANDING.proof.forces
+    for fewer in ((), forces[:-1], (forces[0][:-1], *forces[1:]), (*forces, forces[0])):
+        assert not proves(Stands(fewer), STANDING.structure)
+
+
+@pytest.mark.parametrize("field", ["bodies", "contacts", "narrow"])
+def test_a_standing_that_is_not_as_its_proof_has_it_is_refused(field: str) -> None:
+    assert STANDING is not None
+    at = STANDING.structure._fields.index(field)
+    for path in numbers(STANDING.structure[at]):
+        # How high a weight is, or forces that are all upright, does not matter.
+        if path[1:] == (2, 2):
+            continue
+        # An index, a flag or a length: each is changed to what it is not.
+        wrong = put(
+            STANDING.structure,
+            (at, *path),
+            lambda n: (
+                (not n) if isinstance(n, bool) else n + (1 if abs(n) < 9 and n else ONE // 20)
+            ),
+        )
+        assert not proves(STANDING.proof, wrong), (field, path)
+
+
+def test_a_fall_with_its_motion_or_its_contacts_changed_is_refused() -> None:
+    assert FALLING is not None
+    motion = FALLING.proof.motion
+    still = ((0, 0, 0), (0, 0, 0))
+    up = tuple(((-a, -b, -c), (-d, -e, -f)) for (a, b, c), (d, e, f) in motion)
+    for wrong in ((), motion[:-1], (still,) * len(motion), up, (motion[1], motion[0])):
+        assert not proves(Falls(wrong), FALLING.structure)
+    for body, axis, by in product((0, 1), (0, 1, 2), (ONE, -ONE)):
+        wrong = put(FALLING.proof, (0, body, 0, axis), lambda number, by=by: number + by)
+        assert not proves(wrong, FALLING.structure), (body, axis, by)
+    for contact in range(len(FALLING.structure.wide)):
+        for path in ((0,), (1,)):
+            wrong = put(FALLING.structure, (3, contact, *path), lambda _: 7)
+            assert not proves(FALLING.proof, wrong)
+        wrong = put(FALLING.structure, (3, contact, 3, 2), lambda number: number // 2)
+        assert not proves(FALLING.proof, wrong)
+
+
+def test_the_checker_needs_the_standard_library_alone() -> None:
+    tree = ast.parse(Path(certificate.__file__).read_text(encoding="utf-8"))
+    names = [node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
+    assert not [node for node in ast.walk(tree) if isinstance(node, ast.Import)]
+    assert {str(name).partition(".")[0] for name in names} <= set(sys.stdlib_module_names)

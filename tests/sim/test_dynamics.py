@@ -30,9 +30,8 @@ from phyblock.sim.dynamics import (
 )
 from phyblock.sim.engine import ENGINES, Physics, Pose, World
 from phyblock.sim.outcomes import after_removal, holds
-from tests.designs import built, designed_scene
 from tests.shipped import TASKS, official_tasks
-from tests.sim.structures import block, counterweighted_beam, tower
+from tests.sim.structures import block, built, counterweighted_beam, designed_scene, tower
 from tests.sim.test_geometry import FLOATING
 
 FIRST = replace(DEFAULT_TRIAL, physics=DEFAULT_TRIAL.physics[:1])

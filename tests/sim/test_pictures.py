@@ -62,9 +62,8 @@ from phyblock.sim.question_pictures import (
 )
 from phyblock.sim.ruled import kit_key, ruled_key
 from phyblock.types import BACKGROUNDS, Background
-from tests.designs import designed_scene
 from tests.shipped import TASKS, built_in_questions
-from tests.sim.structures import block, clouds, scene_of, tower
+from tests.sim.structures import block, clouds, designed_scene, scene_of, tower
 
 TASK = TASKS[0]
 STYLE, SMALL = PictureStyle(), PictureStyle(size_px=128)

@@ -25,7 +25,7 @@ from phyblock.scoring.steps import MOVE_OUTCOMES
 from phyblock.tracks.pictures import Workshop
 from phyblock.tracks.step_planning import ENDINGS, STEP_RULES, Feedback, PastStep, StepPlanning
 from phyblock.types import SETTINGS, Setting
-from tests.parsing.test_move import REPLIES
+from tests.parsing.test_replies import REPLIES
 from tests.shipped import TASKS, official_tasks
 from tests.tracks.opened import seesaw, track_of
 

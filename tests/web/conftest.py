@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,14 +12,65 @@ from urllib.parse import quote, urlencode
 
 import pytest
 
-from tests.browser import Visit, expect
 from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.vqa_set import questions, write_questions
 from tests.workspace import Workspace
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, BrowserContext, Page
+    from playwright.sync_api import Browser, BrowserContext, Locator, LocatorAssertions, Page
+
+
+_FLAGS = [
+    *("--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-sync"),
+    *("--disable-background-networking", "--disable-component-update"),
+    # WebGL in software, which draws the same everywhere.
+    *("--use-angle=swiftshader", "--enable-unsafe-swiftshader"),
+]
+_CHROMIUMS = ("chromium", "chromium-browser", "google-chrome")
+
+
+def expect(locator: Locator) -> LocatorAssertions:
+    """Return what waits for a locator; the page forbids `eval`, which other ways need."""
+    from playwright.sync_api import expect as expected
+
+    return expected(locator)
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    """A headless Chromium; its event loop runs while it does, so that it ends with its module."""
+    playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    found = next(filter(None, map(shutil.which, _CHROMIUMS)), None)
+    if found is None:
+        pytest.skip("no Chromium: apt-get install chromium")
+    with playwright.sync_playwright() as started:
+        running = started.chromium.launch(executable_path=found, args=_FLAGS)
+        yield running
+        running.close()
+
+
+class Visit:
+    """A page, and all that it complained of or asked for."""
+
+    def __init__(self, page: Page) -> None:
+        self.page = page
+        self.complaints: list[str] = []
+        self.requests: list[str] = []
+        page.on("console", lambda message: self._complain(message.text))
+        page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        page.on("dialog", lambda dialog: self.complaints.append(dialog.message))
+        page.on("request", lambda request: self.requests.append(request.url))
+
+    def _complain(self, text: str) -> None:
+        # A driver without a graphics card speaks of its own speed.
+        if "GL Driver Message" not in text:
+            self.complaints.append(text)
+
+    def asked_elsewhere(self, *own: str) -> list[str]:
+        """Return the requests to addresses that do not begin so."""
+        return [url for url in self.requests if not url.startswith(own)]
+
 
 HOSTILE = (
     "<script>window.hacked = 1</script><img src=x onerror='window.hacked = 2'>"

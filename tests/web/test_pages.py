@@ -14,8 +14,7 @@ import yaml
 from phyblock.results.tables import write_tables
 from phyblock.scoring.plan import ERROR_TYPES
 from phyblock.web.report import write_report
-from tests.browser import expect
-from tests.web.conftest import HOSTILE, NAME, PageVisit
+from tests.web.conftest import HOSTILE, NAME, PageVisit, expect
 from tests.web.factory import manifest, write_run
 from tests.workspace import Workspace
 

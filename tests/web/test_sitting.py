@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from tests.browser import Visit
 from tests.fork_server import Forked, fork_server
 from tests.vqa_set import questions, write_questions
+from tests.web.conftest import Visit
 from tests.workspace import SCENES, Raw, Workspace
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""Lines of records: read as they were written, refused where they are damaged."""
+"""Lines of data and of records: written again as they are, refused where they are damaged."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import os
 import re
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import jsonschema
 import pytest
@@ -15,14 +16,96 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.errors import StoreError
+from phyblock.data.questions import StoredQuestion
+from phyblock.data.scenes import StoredScene
+from phyblock.errors import DataError, StoreError
 from phyblock.records import files
 from phyblock.records.files import RecordLines, known_records, newest_starts
-from phyblock.records.record import Reply, Usage
+from phyblock.records.record import Line, Reply, Usage, validated
 from phyblock.results.load import load_run
+from tests.data.broken import Raw, sound_scene, with_value
 from tests.documents import ROOT
-from tests.records.damage import DAMAGED, lines_before, plan_record, with_value
+from tests.fuzz.strategies import sound_question
+from tests.records.damage import DAMAGED, lines_before, plan_record
+from tests.records.damage import with_value as record_with
+from tests.shipped import DATA, TASKS, built_in_questions
 from tests.web.factory import manifest
+
+SCENES = Path("phyblock-400", "scenes.jsonl")
+QUESTIONS = Path("phyblock-vqa", "questions.jsonl")
+
+
+def lines_of(path: Path) -> list[str]:
+    return (DATA / path).read_text(encoding="utf-8").splitlines()
+
+
+def test_shipped_scenes_and_questions_are_written_byte_for_byte() -> None:
+    written = [StoredScene.of(task.scene, task.candidates).as_json() for task in TASKS]
+    assert written == lines_of(SCENES)
+    originals = {task.key: task.scene for task in TASKS}
+    asked = (task.question for task in built_in_questions().tasks)
+    written = [StoredQuestion.of(one, originals[one.scene.id]).as_json() for one in asked]
+    assert written == lines_of(QUESTIONS)
+
+
+@pytest.mark.parametrize(
+    ("kind", "raw"), [(StoredScene, sound_scene()), (StoredQuestion, sound_question())]
+)
+def test_a_line_may_say_its_version_and_none_is_from_the_future(kind: type[Line], raw: Raw) -> None:
+    for line in (raw, {**raw, "format": 1}):
+        assert json.loads(validated(kind, line, "here").as_json()) == line
+    with pytest.raises(DataError) as caught:
+        validated(kind, {**raw, "format": 2}, "here")
+    (problem,) = caught.value.problems
+    assert (problem.field, problem.found, problem.allowed) == ("format", "2", "1")
+
+
+def schema(name: str) -> jsonschema.Draft202012Validator:
+    text = (ROOT / "benchmarks" / "schemas" / f"{name}.schema.json").read_text(encoding="utf-8")
+    jsonschema.Draft202012Validator.check_schema(json.loads(text))
+    return jsonschema.Draft202012Validator(json.loads(text))
+
+
+@pytest.mark.parametrize(
+    ("name", "lines"),
+    [
+        ("scene", lines_of(SCENES)[::25]),
+        ("question", lines_of(QUESTIONS)[::25]),
+        ("record", lines_before()),
+    ],
+    ids=["scene", "question", "record"],
+)
+def test_the_schemas_take_what_is_shipped(name: str, lines: list[str]) -> None:
+    found = schema(name)
+    for line in lines:
+        found.validate(json.loads(line))
+
+
+BROKEN: dict[str, tuple[str, Raw, str, Any]] = {
+    "shape": ("scene", sound_scene(), "blocks.0.type", "ball"),
+    "order": ("scene", sound_scene(), "blocks.0.order", 0),
+    "position": ("scene", sound_scene(), "blocks.0.position", [0, 0]),
+    "levels": ("scene", sound_scene(), "levels", [1, 3]),
+    "no candidates": ("scene", sound_scene(), "candidates", []),
+    "name": ("scene", sound_scene(), "id", "../x"),
+    "view": ("question", sound_question(), "pictures.0.view", [45, 0]),
+    "label": ("question", sound_question(), "pictures.0.label", "E"),
+    "framed": ("question", sound_question(), "pictures.0.framed", False),
+    "color": ("question", sound_question(), "colors.1", "pink"),
+    "field": ("question", sound_question(), "pictures.0.widthout", [1]),
+}
+
+
+@pytest.mark.parametrize(("name", "raw", "at", "value"), BROKEN.values(), ids=BROKEN)
+def test_the_schemas_refuse_what_the_models_refuse(
+    name: str, raw: Raw, at: str, value: object
+) -> None:
+    broken = with_value(raw, at, value)
+    assert schema(name).is_valid(raw)
+    assert not schema(name).is_valid(broken)
+    with pytest.raises(DataError):
+        validated(StoredScene if name == "scene" else StoredQuestion, broken, "here")
+
 
 numbers = st.none() | st.integers(-(10**40), 10**40)
 amounts = st.none() | st.floats()
@@ -116,7 +199,7 @@ def test_what_is_no_file_is_refused(tmp_path: Path, make: Callable[[Path], None]
 
 
 def test_a_sample_is_taken_from_its_last_line(tmp_path: Path) -> None:
-    first, last = lines_before()[0], with_value("reply.text", "later")
+    first, last = lines_before()[0], record_with("reply.text", "later")
     records = RecordLines(folder_with(tmp_path, first, last))
     starts = newest_starts(records)
     assert list(starts.values()) == [len(first) + 1]
@@ -142,20 +225,6 @@ def test_whatever_was_paid_for_is_stored_and_read(
     assert kept.cost_usd in (cost, None)
 
 
-@pytest.fixture(scope="module")
-def schema() -> jsonschema.Draft202012Validator:
-    text = (ROOT / "benchmarks" / "schemas" / "record.schema.json").read_text(encoding="utf-8")
-    jsonschema.Draft202012Validator.check_schema(json.loads(text))
-    return jsonschema.Draft202012Validator(json.loads(text))
-
-
-def test_the_schema_takes_records_of_every_track(schema: jsonschema.Draft202012Validator) -> None:
-    for line in lines_before():
-        schema.validate(json.loads(line))
-
-
 @pytest.mark.parametrize("name", ["huge-number", "number-for-text", "word", "score", "track"])
-def test_the_schema_refuses_what_the_models_refuse(
-    schema: jsonschema.Draft202012Validator, name: str
-) -> None:
-    assert not schema.is_valid(json.loads(DAMAGED[name][0]))
+def test_the_schema_refuses_damaged_records(name: str) -> None:
+    assert not schema("record").is_valid(json.loads(DAMAGED[name][0]))

@@ -1,0 +1,301 @@
+"""Verbs as they are called: help, `models`, `show`, and those that read a finished run."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import click
+import pytest
+from click.testing import CliRunner, Result
+from PIL import Image
+
+from phyblock.cli.main import phyblock
+from phyblock.config.models import ModelConfig
+from phyblock.data.scenes import read_builtin
+from phyblock.errors import SpecError, StoreError
+from phyblock.models import litellm_client
+from phyblock.models.litellm_client import known_providers
+from phyblock.records.files import read_records
+from phyblock.sim.engine import ENGINES
+from phyblock.tracks.step_planning import EpisodeRecord, StepPlanning
+from tests.servers.chassis import Running
+from tests.servers.openai_chat import OpenAIChat
+from tests.vqa_set import questions, vqa_suite, write_questions
+from tests.web.factory import LEVELS, manifest, record, score, write_run
+from tests.workspace import Workspace
+
+VERBS = tuple(phyblock.list_commands(None))  # type: ignore[arg-type]
+CALLS = re.compile(rf"\bphyblock ((?:{'|'.join(VERBS)})\b[^\n`;|&>\"#]*)")
+LIBRARIES = tuple(ENGINES)
+HEAVY = ("litellm", *LIBRARIES, "pandas", "aiohttp", "matplotlib", "phyblock.making")
+SCRIPT = """
+import sys
+from phyblock.cli.main import main
+for words in sys.argv[1:]:
+    sys.argv = ["phyblock", *words.split()]
+    try:
+        main()
+    except SystemExit as ending:
+        assert not ending.code
+sys.stderr.write(" ".join({n.split(".")[0] for n in sys.modules}))
+"""
+
+
+def ask(*commands: str) -> tuple[str, set[str]]:
+    """Return what commands print, and the packages that they imported."""
+    done = subprocess.run(
+        [sys.executable, "-c", SCRIPT, *commands], capture_output=True, text=True, check=True
+    )
+    return done.stdout, set(done.stderr.split())
+
+
+def test_help_names_every_verb_and_imports_nothing_heavy() -> None:
+    told, imported = ask("--help")
+    for verb in VERBS:
+        assert f"\n  {verb} " in told
+    assert "phyblock run quick" in told
+    assert not imported & {*HEAVY, "numpy", "pydantic", "rich", "yaml"}
+
+
+def test_help_of_verbs_and_version_import_nothing_heavy() -> None:
+    verbs = ("run", "report", "score", "validate", "models", "cache", "init")
+    told, imported = ask("--version", *(f"{verb} --help" for verb in verbs))
+    assert told.startswith("phyblock, version ")
+    for verb in verbs:
+        assert f"Usage: phyblock {verb} " in told
+    assert not imported & set(HEAVY)
+
+
+def test_every_option_that_messages_and_docs_name_is_there() -> None:
+    root = Path(__file__).parents[2]
+    written = [*root.glob("phyblock*/**/*.py"), root / "README.md", *root.glob("docs/**/*.md")]
+    named: set[tuple[str, ...]] = set()
+    for path in written:
+        for call in CALLS.findall(path.read_text(encoding="utf-8")):
+            before, *options = re.split(r"(?<!\S)(?=--)", call)
+            words = before.split()
+            named |= {(*words[:2], re.split(r"[^a-z0-9-]", option)[0]) for option in options}
+    assert {verb for verb, *_ in named} >= {"run", "scenes", "compare"}
+    assert [each for each in sorted(named) if not is_option(*each)] == []
+
+
+def is_option(verb: str, *words: str) -> bool:
+    """True if a verb, or its own verb that the next word names, has the option that ends it."""
+    context = click.Context(phyblock)
+    command = phyblock.get_command(context, verb)
+    assert command is not None
+    inner = command.get_command(context, words[0]) if isinstance(command, click.Group) else None
+    known = {name for one in (command, inner) if one for param in one.params for name in param.opts}
+    return words[-1] in known | {"--help"}
+
+
+def test_a_call_that_may_cost_is_made_only_where_somebody_agrees(workspace: Workspace) -> None:
+    with Running(OpenAIChat()) as running:
+        workspace.write_models(running.url, "dear", price={"input": 1.0, "output": 1.0})
+        refused = workspace.phyblock("models", "check", "dear", env={"CI": "1"})
+        assert (refused.code, running.server.requests) == (2, 0)
+        assert "would cost money, and there is no terminal to ask on" in refused.err
+        assert workspace.phyblock("models", "check", "dear", "--yes").code == 0
+        assert running.server.requests == 1
+        workspace.write_models(running.url, "free", price={"input": 0.0, "output": 0.0})
+        assert workspace.phyblock("models", "check", "free").code == 0
+        assert running.server.requests == 2
+
+
+def test_missing_recordings_and_unknown_providers_are_found(workspace: Workspace) -> None:
+    models = {
+        "far": {"replay": "./nowhere"},
+        "odd": {"id": "opnai/gpt-4o", "groups": ["mine"]},
+        "own": {"id": "hosted_vllm/x", "api_base": "http://localhost:1/v1"},
+        "straight": {"id": "My/x", "api_base": "http://localhost:1/v1", "transport": "direct"},
+    }
+    workspace.write_yaml("models.yaml", models)
+    workspace.write_suite(models=["group:mine", "own", "straight"], seeds=[0])
+    done = workspace.phyblock("validate", "models.yaml", "suite.yaml")
+    assert done.code == 2
+    assert "models.yaml:2:11: far.replay: recordings not found" in done.err
+    # Of the suite its own models alone are looked at.
+    assert done.err.count("far.replay") == 1
+    assert done.err.count("models.yaml:4:7: odd.id: is of no provider that is known") == 2
+    assert "did you mean openai?" in done.err
+    assert "own.id" not in done.err
+    assert "straight.id" not in done.err
+
+
+@pytest.mark.parametrize(
+    "model", ["hosted_vllm/x", "openai/new", "gemini/gemini-2.5-pro", "anthropic/claude-unheard-of"]
+)
+def test_a_model_at_hand_needs_no_litellm(model: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(litellm_client, "_litellm", lambda: pytest.fail("it was imported"))
+    assert model.partition("/")[0] in known_providers(ModelConfig(name="m", id=model))
+
+
+REPORT = StepPlanning.report()
+
+SEESAW = {
+    "id": "seesaw",
+    "levels": [2],
+    "parents": ["seesaw"],
+    "blocks": [
+        *(
+            {"order": n, "type": "cube", "color": color, "layer": 1, "depend": [0],
+             "position": [x, 0, 0.025], "euler": [0, 0, 0]}
+            for n, color, x in ((1, "red", 0), (2, "blue", 0.11))
+        ),
+        {"order": 3, "type": "cuboid3", "color": "yellow", "layer": 2, "depend": [1],
+         "position": [0.055, 0, 0.0625], "euler": [0, 0, 0]},
+    ],
+    "candidates": [
+        {"type": t, "color": c, "euler": [0, 0, 0], "required": 1}
+        for t, c in (("cube", "red"), ("cube", "blue"), ("cuboid3", "yellow"))
+    ],
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def played(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Workspace:
+    """A run of oracle and repeat; in some of eight seeds the oracle lets the bar fall."""
+    workspace = Workspace(tmp_path_factory.mktemp("played"), pictures_dir)
+    workspace.write_scenes(SEESAW)
+    workspace.write_suite(
+        tracks=["step_planning"],
+        models=["oracle", "repeat"],
+        seeds=list(range(8)),
+        steps={"physics": "strict"},
+    )
+    assert workspace.run("--no-cache").code == 0
+    return workspace
+
+
+def test_an_episode_is_shown_step_by_step(played: Workspace) -> None:
+    endings = {r["seed"]: r["ending"] for r in played.records() if r["model"] == "oracle"}
+    assert set(endings.values()) == {"completed", "collapsed"}
+    fallen = next(seed for seed, ending in endings.items() if ending == "collapsed")
+    gif = played.root / "a" / "out.gif"
+    done = played.phyblock("show", "out", f"oracle/seesaw/s{fallen}", "--gif", gif, "--size", "128")
+    assert (done.code, done.err) == (0, "")
+    assert "Collapsed" in done.out
+    assert ["2.", "Move(3):", "Placed"] in [line.split()[:3] for line in done.out.splitlines()]
+    assert "3 yellow cuboid3" in done.out
+    with Image.open(gif) as frames:
+        assert frames.n_frames == 4
+        frames.seek(2)
+        before = frames.convert("RGB").crop((262, 17, 390, 145)).tobytes()
+        frames.seek(3)
+        assert frames.convert("RGB").crop((262, 17, 390, 145)).tobytes() != before
+
+
+def test_a_film_tells_the_outcome_of_each_step_and_the_end(played: Workspace) -> None:
+    (task,) = read_builtin(played.root / "data").tasks
+    for episode in read_records(played.root / "out"):
+        assert isinstance(episode, EpisodeRecord)
+        _, *frames, last = REPORT.film(episode, task)
+        for frame, outcome in zip(frames, episode.outcomes, strict=True):
+            heading = REPORT.heading("step", outcome)
+            assert frame.caption.endswith("Done" if outcome == "done" else f": {heading}")
+        turns = tuple(turn.model_copy(update={"outcome": "empty"}) for turn in episode.turns)
+        _, *unread, _ = REPORT.film(episode.model_copy(update={"turns": turns}), None)
+        assert all(frame.caption.endswith(": Empty") for frame in unread)
+        assert last.caption.startswith(f"{episode.progress[-1]} of 3 blocks placed; ended: ")
+
+
+def test_a_plan_is_shown_from_its_prompt_to_its_verdicts(workspace: Workspace) -> None:
+    with Running(OpenAIChat()) as running:
+        workspace.write_models(running.url, "alpha")
+        workspace.write_suite(models=["alpha"])
+        assert workspace.run().code == 0
+    shown = next(one for one in workspace.records() if one["scene"] == "t3")
+    done = workspace.phyblock("show", "out", "alpha/t3", env={"COLUMNS": "80"})
+    assert (done.code, done.err) == (0, "")
+    assert max(map(len, done.out.splitlines())) <= 80
+    parts = ("\nPrompt (", "\nReply\n", "\nRead\n", "\n1. block ", " blocks placed\n")
+    order = [done.out.index(text) for text in parts]
+    assert order == sorted(order)
+    assert shown["reply"]["text"].splitlines()[0] in done.out
+    assert " ".join(map(str, shown["parse"]["plan"])) in done.out
+    steps = re.findall(r"^\d+\. block (\d+): ", done.out, re.MULTILINE)
+    assert steps == [str(candidate) for candidate in shown["parse"]["plan"]]
+
+
+def test_an_answer_is_shown_with_the_right_one(workspace: Workspace) -> None:
+    write_questions(workspace.root / "questions", questions(per_subtask=2, subtasks=("SH", "CO")))
+    workspace.write_suite(**vqa_suite())
+    assert workspace.run("--models", "random").code == 0
+    for shown in workspace.records()[:4]:
+        done = workspace.phyblock("show", "out", shown["sample"])
+        assert (done.code, done.err) == (0, "")
+        verdict = "right" if shown["answer"]["correct"] else "wrong: the answer is "
+        assert f"\n{verdict}" in done.out
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    records = [
+        record(model, scene, seed, [score(tp, 4 - tp, 4 - tp), score(tp, 0, 1, setting="B")])
+        for model, tp in (("alpha", 4), ("beta", 1))
+        for scene in LEVELS
+        for seed in (0, 1)
+    ]
+    facts = manifest(models=[("alpha", "GPT-4.1"), "beta"])
+    return write_run(tmp_path / "run", records, facts)
+
+
+def call(*words: str | Path) -> Result:
+    return CliRunner().invoke(phyblock, [str(word) for word in words], catch_exceptions=False)
+
+
+def test_tables_print_all_or_one_in_any_form(folder: Path) -> None:
+    everything = call("report", folder, "--print").output
+    for caption in ("Assembly planning", "Wrong steps by type", "Coverage", "Tokens, cost"):
+        assert caption in everything
+    one = call("report", folder, "--print", "--only", "errors", "--format", "md").output
+    assert one.startswith("**Wrong steps by type (%)")
+    assert (
+        r"\begin{tabular}"
+        in call("report", folder, "--print", "--only", "cost", "--format", "tex").output
+    )
+    with pytest.raises(SpecError, match="no such table"):
+        call("report", folder, "--print", "--only", "table9")
+    assert not (folder / "tables").exists()
+
+
+def test_compare_says_the_verdict(folder: Path, tmp_path: Path) -> None:
+    done = call("compare", folder, "--models", "alpha,beta", "--out", tmp_path / "out")
+    # Five base scenes are too few for five comparisons.
+    assert "cannot tell" in done.output
+    assert (tmp_path / "out" / "comparison.tex").exists()
+    assert call("compare", folder, "--track", "full_planning").output.startswith("Models compared")
+    with pytest.raises(SpecError, match="no such track to compare"):
+        call("compare", folder, "--track", "vqa")
+    with pytest.raises(SpecError, match="no such model"):
+        call("compare", folder, "--models", "alpha,delta")
+    with pytest.raises(SpecError, match="a model twice"):
+        call("compare", folder, "--models", "alpha,alpha")
+    assert "empty name" in call("compare", folder, "--models", "alpha,").output
+    with pytest.raises(StoreError, match=r"holds no run\.yaml"):
+        call("compare", folder, tmp_path)
+
+
+def test_figures_and_exports_name_what_they_wrote(folder: Path) -> None:
+    done = call("figures", folder, "--only", "errors")
+    assert done.output.split() == [
+        str(folder / "paper" / f"errors.{e}") for e in ("pdf", "svg", "png", "txt", "tex")
+    ]
+    done = call("figures", folder, "--only", "losses", "--models", "alpha", "--out", folder / "x")
+    assert (folder / "x" / "losses.pdf").is_file()
+    for wrong in ("--width wide", "--width 20", "--font comic"):
+        refused = call("figures", folder, *wrong.split())
+        assert refused.exit_code == 2, wrong
+        assert "Invalid value" in refused.output
+    with pytest.raises(SpecError, match="no such model"):
+        call("figures", folder, "--models", "omega")
+    with pytest.raises(SpecError, match="no such figure"):
+        call("figures", folder, "--only", "radar")
+    for ignored in ((folder, "--to", "csv", "--limit", 3), ("--to", "lmms-eval", "--data", "no")):
+        refused = call("export", *ignored, "--out", folder / "x")
+        assert (refused.exit_code, "leave it out" in refused.output) == (2, True)
+    done = call("export", folder, "--to", "csv")
+    assert done.output.strip() == str(folder / "export" / "csv" / "records.csv")

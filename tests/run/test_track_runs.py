@@ -1,0 +1,412 @@
+"""Whole runs of questions and of episodes, and of all tracks that ask for JSON."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import shutil
+from collections import Counter
+from typing import Any
+
+import pytest
+import yaml
+from PIL import Image as PillowImage
+
+from phyblock.data.questions import read_questions
+from phyblock.data.scenes import read_builtin
+from phyblock.domain.question import LETTERS, Question
+from phyblock.errors import InputError, SpecError
+from phyblock.results.compare import compare_runs
+from phyblock.results.load import load_run
+from phyblock.run.rescore import rescore
+from phyblock.sim.engine import ENGINES, described_engine, installed_engines
+from phyblock.sim.pictures import PictureStyle
+from phyblock.sim.question_pictures import question_png
+from tests.fork_server import Done
+from tests.servers.chassis import ISSUE_MIX, Faults, Running, Seen
+from tests.servers.openai_chat import OpenAIChat
+from tests.servers.step_agent import StepAgent, said, told_history
+from tests.vqa_set import questions, vqa_suite, write_questions
+from tests.workspace import Raw, Workspace, call, candidates
+
+TRACKS = ["full_planning", "step_planning", "vqa"]
+FORMAT = {"answer_format": "json_schema"}
+RULE = "json"
+
+
+def schema_of(seen: Seen) -> Raw:
+    """The schema that a prompt ends with."""
+    schema: Raw = json.loads(str(seen.parts[-1]).splitlines()[-1])
+    return schema
+
+
+def obedient(seen: Seen) -> str:
+    """Answer in the schema of the prompt: alpha that alone, beta in a sentence."""
+    schema = schema_of(seen)
+    *_, key = schema["properties"]
+    told = schema["properties"][key]
+    value = told["items"]["enum"][:4] if told["type"] == "array" else told["enum"][0]
+    text = json.dumps({"reasoning": "Step1: Move block with index 9", key: value})
+    return text if seen.model == "alpha" else f"Here it is: {text}"
+
+
+@pytest.fixture
+def asked(inside: Workspace) -> tuple[Workspace, list[Seen]]:
+    """A whole run of three tracks and three models, and what the server saw."""
+    workspace = inside
+    write_questions(workspace.root / "questions", questions(subtasks=["SH", "OR"], per_subtask=1))
+    workspace.write_suite(
+        tracks=TRACKS,
+        models=["alpha", "beta", "random"],
+        vqa={"path": "./questions"},
+        steps={"physics": "off", "max_steps": 2},
+        **FORMAT,
+    )
+    server = OpenAIChat(say=obedient)
+    with Running(server) as running:
+        base = {"api_base": f"{running.url}/v1"}
+        entries = {name: {"id": f"hosted_vllm/{name}", **base} for name in ("alpha", "beta")}
+        entries["beta"]["response_format"] = "never"
+        workspace.write_yaml("models.yaml", entries)
+        assert call("run", "suite.yaml", "--out", "out", "--no-report", "--limit", 2) == 0
+    return workspace, server.seen
+
+
+def rules(record: Raw) -> set[str | None]:
+    parses = [turn["parse"] for turn in record.get("turns", ())] or [record["parse"]]
+    return {parse["rule"] for parse in parses}
+
+
+def test_all_tracks_ask_and_read_by_the_schema(
+    asked: tuple[Workspace, list[Seen]], capsys: pytest.CaptureFixture[str]
+) -> None:
+    workspace, seen = asked
+    for one in seen:
+        sent = one.params.get("response_format")
+        assert (sent is not None) == (one.model == "alpha")
+        assert sent is None or sent["json_schema"]["schema"] == schema_of(one)
+    records = workspace.records()
+    assert Counter(record["track"] for record in records) == dict.fromkeys(TRACKS, 6)
+    for record in records:
+        how = {"alpha": "response_format", "beta": "prompt"}.get(record["model"])
+        assert record.get("asked") == how
+        assert record["outcome"] == "ok"
+        # Baselines are asked nothing, and read as any text is.
+        assert (rules(record) == {RULE}) == (how is not None)
+    plans = [r["parse"]["plan"] for r in records if r["track"] == "full_planning" and "asked" in r]
+    assert plans == [[1, 2, 3, 4]] * 4
+    for name in ("table1.md", "table2.md", "table3.md"):
+        assert "answers asked for as JSON" in workspace.tables()[name].decode()
+
+    # Under the other format it is another run; judged again it is the same.
+    capsys.readouterr()
+    with pytest.raises(InputError, match="another run"):
+        call("run", "suite.yaml", "--out", "out", "--limit", 2, "--set", "answer_format=text")
+    assert call("score", "out") == 0
+    again = workspace.records()
+    judged = ("parse", "scores", "asked", "outcome", "turns", "answer")
+    for one, other in zip(records, again, strict=True):
+        assert [one.get(name) for name in judged] == [other.get(name) for name in judged]
+
+    # A recording is read in the form in which it was asked for.
+    lines = [json.dumps(r) for r in records if r["track"] == "full_planning"]
+    (workspace.root / "recorded").mkdir()
+    shutil.copy(workspace.out / "run.yaml", workspace.root / "recorded")
+    (workspace.root / "recorded" / "records.jsonl").write_text("\n".join(lines) + "\n")
+    workspace.write_yaml("models.yaml", {"alpha": {"replay": "./recorded"}})
+    workspace.write_suite(models=["alpha"])
+    with pytest.raises(InputError, match="was made with answer_format: json_schema"):
+        call("validate", "suite.yaml")
+    workspace.write_suite(models=["alpha"], **FORMAT)
+    replayed = workspace.root / "replayed"
+    assert call("run", "suite.yaml", "--out", replayed, "--no-report", "--limit", 2) == 0
+    assert {rule for r in workspace.records(replayed) for rule in rules(r)} == {RULE}
+
+
+FEW_QUESTIONS = ["SH", "VP", "OR", "AD"]
+
+
+def a_cube(seen: Seen) -> str:
+    """The letter of the cube wherever it stands; else A."""
+    found = re.search(r"^([A-D])\. cube$", str(seen.parts[-1]), re.MULTILINE)
+    return f"It looks like a cube.\n\nAnswer: {found[1] if found else 'A'}"
+
+
+def run_with(
+    workspace: Workspace,
+    server: OpenAIChat,
+    *args: str,
+    models: tuple[str, ...] = ("alpha",),
+    seeds: tuple[int, ...] = (0,),
+    **fields: Any,
+) -> Done:
+    write_questions(workspace.root / "questions")
+    with Running(server) as running:
+        workspace.write_models(running.url, *models, transport="direct")
+        workspace.write_suite(
+            **{**vqa_suite(**fields), "models": list(models), "seeds": list(seeds)}
+        )
+        return workspace.run(*args)
+
+
+def pictures_of(workspace: Workspace) -> dict[str, tuple[Question, dict[str, str]]]:
+    """By question, the digest of each of its pictures by label, drawn here."""
+    scenes = read_builtin(workspace.root / "data")
+    found = read_questions(workspace.root / "questions", scenes)
+    style = PictureStyle(size_px=128)
+    return {
+        task.key: (
+            task.question,
+            {
+                picture.label: hashlib.sha256(question_png(picture, style)).hexdigest()
+                for picture in task.question.pictures
+            },
+        )
+        for task in found.tasks
+    }
+
+
+def shown(seen: Seen) -> list[tuple[str, str]]:
+    """Caption and digest of each picture in the order in which they arrived."""
+    parts = seen.parts[:-1]
+    pairs = [(parts[i], parts[i + 1]) for i in range(0, len(parts), 2)]
+    for caption, picture in pairs:
+        assert isinstance(caption, str)
+        assert isinstance(picture, tuple)
+        assert picture[0] == "image/png"
+    return [(str(caption), picture[1]) for caption, picture in pairs]
+
+
+def test_pictures_arrive_in_order_each_with_its_caption(workspace: Workspace) -> None:
+    server = OpenAIChat(say=a_cube)
+    done = run_with(workspace, server, subtasks=FEW_QUESTIONS, per_subtask=2)
+    assert (done.code, done.err) == (0, "")
+    drawn = pictures_of(workspace)
+    by_text = {question.text: (question, labels) for question, labels in drawn.values()}
+    assert server.requests == 8
+    for seen in server.seen:
+        found = re.search(r"^Question: (.*)$", str(seen.parts[-1]), re.MULTILINE)
+        assert found is not None
+        question, labels = by_text[found[1]]
+        captions = {
+            "scene": "First picture:" if len(labels) > 1 else "Picture:",
+            "block": "Second picture, one block by itself:",
+            **{letter: f"Picture {letter}:" for letter in LETTERS},
+        }
+        order = [label for label in ("scene", "block", *LETTERS) if label in labels]
+        assert shown(seen) == [(captions[label], labels[label]) for label in order]
+        assert len(order) == {"SH": 1, "VP": 5, "OR": 4, "AD": 2}[question.subtask]
+    for record in workspace.records():
+        question = drawn[record["question"]["id"]][0]
+        assert record["answer"]["right"] == question.answer_letters
+        assert record["answer"]["correct"] == (
+            record["answer"]["given"] == record["answer"]["right"]
+        )
+        assert record["outcome"] == ("parse_failure" if question.subtask == "OR" else "ok")
+
+
+def test_pictures_of_official_files_are_sent_byte_for_byte(workspace: Workspace) -> None:
+    folder = workspace.root / "questions"
+    folder.mkdir()
+    entry = {
+        "scene_id": "t1",
+        "question": "What comes next?",
+        "options": ["<img1>", "<img2>", "<img3>", "<img4>"],
+        "answer": "D",
+    }
+    (folder / "PD.json").write_text(json.dumps([entry]), encoding="utf-8")
+    digests = {}
+    for name in ("t1", *(f"pd-001/img{i}" for i in range(1, 5))):
+        path = folder / "images" / f"{name}.png"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        PillowImage.new("RGB", (40, 30), (8 * len(digests), 90, 120)).save(path)
+        digests[name] = hashlib.sha256(path.read_bytes()).hexdigest()
+    server = OpenAIChat(say=lambda _: "D")
+    with Running(server) as running:
+        workspace.write_models(running.url, "alpha", transport="direct")
+        fields = vqa_suite(format="official", circular=True)
+        workspace.write_suite(**{**fields, "models": ["alpha"]})
+        done = workspace.run()
+    assert (done.code, done.err) == (0, "")
+    first, *others = digests.values()
+    sent = [tuple(digest for _, digest in shown(seen)) for seen in server.seen]
+    turned = {(first, *others[by:], *others[:by]) for by in range(4)}
+    assert len(sent) == len(turned) == 4
+    assert set(sent) == turned
+    right = {record["answer"]["right"] for record in workspace.records()}
+    assert right == set(LETTERS)
+
+
+def test_circular_and_blind_a_question_counts_once_and_only_if_all_rotations_are_right(
+    workspace: Workspace,
+) -> None:
+    server = OpenAIChat(say=a_cube)
+    done = run_with(
+        workspace, server, circular=True, blind=True, subtasks=["SH", "CO"], per_subtask=3
+    )
+    assert (done.code, done.err) == (0, "")
+    assert server.requests == 24
+    made = {one["id"]: one for one in questions()}
+    records = workspace.records()
+    assert Counter(record["question"]["rotation"] for record in records) == dict.fromkeys(
+        range(4), 6
+    )
+    is_cube = {
+        name: made[name]["options"][LETTERS.index(made[name]["answer"])] == "cube"
+        for name in {record["question"]["id"] for record in records}
+    }
+    assert all(
+        record["answer"]["correct"] == is_cube[record["question"]["id"]] for record in records
+    )
+    cells = accuracies(workspace, "accuracy")
+    for subtask in ("SH", "CO"):
+        right = [held for name, held in is_cube.items() if name.startswith(subtask.lower())]
+        assert float(cells[subtask]["value"]) == pytest.approx(sum(right) / 3, abs=1e-6)
+        assert cells[subtask]["n"] == "3"
+    assert "circular" in done.out
+    assert "[circular, blind]" in workspace.tables()["table2.tex"].decode().replace(
+        "{", ""
+    ).replace("}", "")
+
+
+def accuracies(workspace: Workspace, measure: str) -> dict[str, Raw]:
+    rows = workspace.rows("estimates")
+    return {row["cell"]: row for row in rows if row["measure"] == measure}
+
+
+AT_ONCE = 4
+FEW = ("--limit", "3")
+VOLATILE = ("time", "latency_s", "attempts", "cached", "run")
+
+
+def prepare(workspace: Workspace, url: str, **fields: Any) -> None:
+    workspace.write_models(url, "alpha")
+    suite = {
+        "tracks": ["step_planning"],
+        "models": ["alpha"],
+        "images": {"size_px": 128, "layout": "separate"},
+        "limits": {"max_concurrency": AT_ONCE, "max_attempts": 8},
+        "steps": {"physics": "off"},
+        **fields,
+    }
+    workspace.write_suite(**suite)
+
+
+def stable(value: Any) -> Any:
+    """A record without what differs between two runs of the same replies."""
+    if isinstance(value, dict):
+        return {k: stable(v) for k, v in value.items() if k not in VOLATILE}
+    return [stable(v) for v in value] if isinstance(value, list) else value
+
+
+def by_sample(records: list[dict[str, Any]]) -> dict[str, Any]:
+    return {record["sample"]: stable(record) for record in records}
+
+
+def test_the_server_sees_goal_candidates_current_picture_and_history(workspace: Workspace) -> None:
+    with Running(StepAgent()) as running:
+        prepare(workspace, running.url)
+        assert workspace.run().code == 0
+        seen = running.server.seen
+    records = workspace.records()
+    assert sum(len(record["turns"]) for record in records) == len(seen)
+    answers = {one.sample: one for one in seen}
+    for record in records:
+        mine = [answers[turn["reply"]["reasoning"]] for turn in record["turns"]]
+        assert all(isinstance(part, tuple) for one in mine for part in one.parts[:3])
+        assert all(isinstance(one.parts[3], str) for one in mine)
+        assert {len(one.parts) for one in mine} == {4}
+        goals = {one.pictures[:2] for one in mine}
+        assert len(goals) == 1
+        operations: list[str] = []
+        world: list[int] = []
+        current: dict[tuple[int, ...], str] = {}
+        for one, turn in zip(mine, record["turns"], strict=True):
+            labels = [image["label"] for image in turn["prompt"]["images"]]
+            assert labels == ["goal", "candidates", "current"]
+            assert [image["sha256"] for image in turn["prompt"]["images"]] == [*one.pictures]
+            assert told_history(one) == operations
+            assert current.setdefault(tuple(world), one.pictures[2]) == one.pictures[2]
+            assert turn["reply"]["text"] == said(one)
+            move = turn["parse"]["move"]
+            operations.append(f"Move({move})" if move else "(no operation)")
+            world = turn["world"]
+        assert len(set(current.values())) == len(current)
+
+
+def test_faults_change_nothing(workspace: Workspace) -> None:
+    found = []
+    for faults in (Faults(), ISSUE_MIX):
+        with Running(StepAgent(Faults(**{**vars(faults), "retry_after": "0"}))) as running:
+            prepare(workspace, running.url)
+            workspace.out = workspace.root / f"out{len(found)}"
+            assert workspace.run("--no-cache", *FEW).code == 0
+            found.append(by_sample(workspace.records()))
+    assert found[0] == found[1]
+
+
+SMALL = ("--set", "images.size_px=128", "--set", "seeds=[0]", "--no-report")
+DATA = ("--set", "dataset.path=./data")
+
+
+def unsteady_scene() -> Raw:
+    """A plank that tips off its post until the second weight is on."""
+    places = [("cube", [0, 0, 0.025], 0), ("cuboid3", [0, 0, 0.0625], 90)]
+    places += [("cube", [0, 0.07, 0.1], 0), ("cube", [0, -0.07, 0.1], 0)]
+    depends = [[0], [1], [2], [2]]
+    blocks = [
+        {
+            "order": order,
+            "type": block_type,
+            "color": "red",
+            "layer": min(order, 3),
+            "depend": depends[order - 1],
+            "position": position,
+            "euler": [0, 0, turn],
+        }
+        for order, (block_type, position, turn) in enumerate(places, 1)
+    ]
+    plank = {"type": "cuboid3", "color": "red", "euler": [0, 0, 90], "required": 1}
+    cubes = {**candidates()[0], "required": 3}
+    others = [{**one, "required": 0} for one in candidates()[1:15]]
+    named = {"id": "beam", "levels": [3], "parents": ["beam"]}
+    return {**named, "blocks": blocks, "candidates": [cubes, plank, *others]}
+
+
+@pytest.mark.skipif(len(installed_engines()) < 2, reason="one engine is installed")
+def test_runs_in_two_engines_are_scored_anywhere_and_never_compared(
+    inside: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Falls are read from the records, whichever engine is here now."""
+    workspace = inside
+    workspace.write_scenes(unsteady_scene())
+    suite = ("--models", "oracle", *SMALL, *DATA, "--set", "steps.physics=strict")
+    usual, other = (workspace.root / name for name in ENGINES)
+    endings, names = {}, []
+    for out in (usual, other):
+        monkeypatch.setenv("PHYBLOCK_PHYSICS", out.name)
+        names.append(described_engine())
+        call("run", "steps", "--out", out, *suite)
+        manifest = yaml.safe_load((out / "run.yaml").read_bytes())
+        (record,) = map(json.loads, (out / "records.jsonl").read_text().splitlines())
+        assert record["engine"] == manifest["engine"]
+        endings[manifest["engine"]] = record["ending"]
+    assert endings == dict.fromkeys(names, "collapsed")
+
+    asked = (usual / "records.jsonl").read_text()
+    rescore(usual)
+    assert (usual / "records.jsonl").read_text() == asked
+    runs = [load_run(out) for out in (usual, other)]
+    with pytest.raises(SpecError, match="physics: cannot be compared"):
+        compare_runs(*runs, ())
+
+
+@pytest.mark.parametrize(("mode", "outcome"), [("length", "truncated"), ("filtered", "refusal")])
+def test_an_episode_of_which_no_reply_is_whole_is_no_parse_failure(
+    workspace: Workspace, mode: str, outcome: str
+) -> None:
+    with Running(StepAgent(Faults(mode=mode))) as running:
+        prepare(workspace, running.url)
+        assert workspace.run(*FEW).code == 0
+    assert {record["outcome"] for record in workspace.records()} == {outcome}
