@@ -1,12 +1,12 @@
 """The assembly of one scene as an episode of reinforcement learning (docs/tutorials/agent.md).
 
 An action is the number of a candidate, or 0 for Done: a right move puts the block at its goal pose
-and gives a reward of 1, a wrong one changes nothing and gives 0. With `action="pose"` it also says
-where the block goes, and physics decides where it comes to rest.
+for a reward of 1, a wrong one changes nothing and has reward 0. With `action="pose"` the action
+also gives the position of the block, and physics decides where it comes to rest.
 
-With `observe="state"` a block is a row of `TRAITS` numbers: 1 where there is a block, the indices
-of its type and color in `phyblock.domain.BLOCK_TYPES` and `COLORS`, its Euler angles [degrees], and
-the position of its center [m], 0 for candidates. Rows that hold no block are 0.
+With `observe="state"` a block is a row of `TRAITS` numbers: 1 if there is a block, the indices of
+its type and color in `phyblock.domain.BLOCK_TYPES` and `COLORS`, its Euler angles [degrees], and
+the position of its center [m], 0 for candidates. Rows without a block are 0.
 """
 
 from __future__ import annotations
@@ -54,21 +54,21 @@ Observe = Literal["pictures", "state", "text"]
 Action = Literal["block", "pose"]
 
 DONE = 0
-"""The number that ends the assembly; any other is that of a candidate."""
+"""The action that ends the assembly; all others are numbers of candidates."""
 MOST_BLOCKS = 64
 """Rows of a goal; built-in ones have 22 blocks at most."""
 TRAITS = 9
-"""There, type, color, three angles, three coordinates."""
+"""Presence, type, color, three angles, three coordinates."""
 _PICTURES = ("goal", "candidates", "current")
-"""Pictures of an observation, as the prompt of step planning names them, in its order."""
+"""Pictures of an observation, with the names and order of the step planning prompt."""
 _KEPT_PICTURES = 64
-"""Pictures of one scene that are kept; 50 MB at 512 pixels."""
+"""Cached pictures of one scene; 50 MB at 512 pixels."""
 _MOST_CHARACTERS = 1 << 20
 _SMALLEST_PX = 16
 _LEVELS = (1, 2, 3, 4, 5)
 _CM = 100.0
 _NEAR = (1.0, 10.0)
-"""Distance and turn within which a block has reached its place [cm, degrees]."""
+"""Distance and angle within which a block has reached its place [cm, degrees]."""
 
 
 def _rows(blocks: Sequence[Block] | Sequence[Candidate], most: int) -> NDArray[np.float32]:
@@ -82,7 +82,7 @@ def _rows(blocks: Sequence[Block] | Sequence[Candidate], most: int) -> NDArray[n
 
 
 class _BlockPlay:
-    """Building with candidates, after `begin`: a right move puts its block at its goal pose.
+    """Assembly with candidates, after `begin`: a right move puts its block at its goal pose.
 
     `act` returns the outcome of an action, its reward, and whether it was right; None for Done.
     """
@@ -118,7 +118,7 @@ class _BlockPlay:
             self._settled = Settled((), state)
             if self._physics != "off":
                 settled = self._site.settle(state)
-                # What falls is held at its goal pose, or under `strict` lies where it fell.
+                # Blocks that fall are held at their goal poses, or stay fallen under `strict`.
                 lying = settled.blocks if self._is_strict else state
                 self._settled = Settled(settled.fallen, lying)
         return move.outcome, float(is_placed), is_placed
@@ -160,8 +160,8 @@ class _BlockPlay:
 
 
 class _PosePlay:
-    """Building with poses, after `begin`: blocks are let go where actions say, with the tolerances
-    of `ExecutionLimits`; a goal block is reached by one of its kind within `_NEAR`.
+    """Assembly with poses, after `begin`: blocks are released at the positions of actions, with the
+    tolerances of `ExecutionLimits`; a goal block is reached by one of its kind within `_NEAR`.
     """
 
     def __init__(self, style: PictureStyle, *, is_strict: bool) -> None:
@@ -183,7 +183,7 @@ class _PosePlay:
         self._reached = 0
 
     def act(self, action: Any) -> tuple[str, float, bool] | None:
-        """Put a block and let it go; worth the goal blocks newly reached, less those lost."""
+        """Place and release a block; the reward is the change in the number of reached blocks."""
         if not isinstance(action, Mapping) or set(action) != {"block", "center_m"}:
             raise ValueError(f"action is {action!r}; allowed: a mapping of block, center_m")
         number = int(action["block"])
@@ -205,7 +205,7 @@ class _PosePlay:
 
     @property
     def has_ended(self) -> bool:
-        """True once the goal is complete and nothing else lies about, or a strict step failed."""
+        """True if the goal is complete without extra blocks, or a strict step failed."""
         has_fallen = self._last is not None and self._last.end in ("falls", "knocks_over")
         return self._is_complete or (self._is_strict and has_fallen)
 
@@ -218,7 +218,7 @@ class _PosePlay:
         return tuple(self._named[block.order - 1] for block in self.blocks)
 
     def right_moves(self) -> tuple[dict[str, Any], ...]:
-        """The actions that put a goal block not reached on what is, those of low layers first."""
+        """The actions that place an unreached goal block on reached ones, low layers first."""
         scene = self._scene
         is_there = [self._count((block,)) == 1 for block in scene.blocks]
         needs, layers = scene.graph.depends_on, scene.graph.layers
@@ -259,14 +259,14 @@ class _PosePlay:
 
 
 class PhyBlockEnv(gymnasium.Env[Observation, Any]):
-    """Builds one scene an episode, block by block.
+    """Builds one scene per episode, block by block.
 
     Observations are pictures (`current`, `goal`, `candidates`: RGB, shape (size, size, 3), uint8),
     with `observe="text"` also `text`, the prompt of step planning about them. With
-    `observe="state"` they are numbers alone (`goal` and `candidates`: a row a block, float32, see
-    the module; `placed`: number of blocks placed as each candidate, shape (16,), uint8; `left`: the
-    share of steps that is left, shape (1,), float32; where actions are poses also `world`: the
-    blocks where they lie, rows as in `goal`).
+    `observe="state"` they are only numbers (`goal` and `candidates`: one row per block, float32,
+    see the module; `placed`: number of blocks placed as each candidate, shape (16,), uint8; `left`:
+    the share of remaining steps, shape (1,), float32; if actions are poses, also `world`: the
+    current blocks, rows as in `goal`).
     It terminates with Done, the goal complete, and under `physics="strict"` a collapse; it is
     truncated after `max_steps` steps (None: twice the blocks) or `max_failures` failures in a row.
     """
@@ -291,11 +291,12 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
         render_mode: str | None = None,
     ) -> None:
         """Play `data`, a data set (a folder, an official checkout, a bundled name) or tasks: scenes
-        of `levels` (None: of all), or one `scene`. With `action="pose"` a block is put where the
-        action says, turned as its candidate is; `setting` and `gating` are of `action="block"`.
+        of `levels` (None: all), or one `scene`. With `action="pose"` a block is put at the position
+        of the action, in its candidate's orientation; `setting` and `gating` are for
+        `action="block"`.
 
-        Raises DataError for a data set or scene that is not there, ValueError for an option that
-        is not among those allowed, a limit below 1, or no tasks at all.
+        Raises DataError for a missing data set or scene, ValueError for an option that is not
+        allowed, a limit below 1, or no tasks at all.
         """
         for name, value, allowed in (
             ("setting", setting, SETTINGS),
@@ -308,7 +309,7 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
             if value not in allowed:
                 raise ValueError(f"{name} is {value!r}; allowed: {', '.join(map(str, allowed))}")
         if action == "pose" and (setting != "A" or gating != "aov"):
-            raise ValueError("setting and gating are of action='block'; leave them out")
+            raise ValueError("setting and gating are for action='block'; remove them")
         if action == "pose" and observe == "text":
             raise ValueError("observe is 'text'; the prompt of a step is of action='block' alone")
         if action == "pose" and physics == "off":
@@ -329,7 +330,7 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
         self._data = Dataset("data", Path("data"), tasks)
         self._scene = None if scene is None else self._data.task(scene).key
         self._observe = observe
-        # Below the smallest that is drawn, whole pixels are put together.
+        # Below the smallest drawn size, whole pixels are combined.
         self._shrink = max(1, -(-SMALLEST_PX // size_px))
         style = PictureStyle(size_px * self._shrink, background)
         self._task = tasks[0]
@@ -372,9 +373,9 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
     def reset(
         self, *, seed: int | None = None, options: Mapping[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
-        """Begin a scene: `options["scene"]`, else the one given, else one drawn at random.
+        """Begin a scene: `options["scene"]`, else the given one, else a random one.
 
-        Raises ValueError for another option, DataError for a scene that is not there.
+        Raises ValueError for any other option, DataError for an unknown scene.
         """
         if unknown := sorted(map(str, set(options or {}) - {"scene"})):
             raise ValueError(f"options has {', '.join(unknown)}; allowed: scene")
@@ -388,8 +389,8 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Try a candidate, or end the assembly.
 
-        Raises ValueError for an action outside the space, ResetNeeded of gymnasium where the
-        episode has ended.
+        Raises ValueError for an action outside the space, gymnasium's ResetNeeded after the end of
+        the episode.
         """
         if self._is_over:
             raise gymnasium.error.ResetNeeded("the episode has ended: call reset() before step()")
@@ -420,9 +421,9 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
         return self._play.right_moves()
 
     def action_masks(self) -> NDArray[np.bool_]:
-        """The numbers that mean something in this scene, shape (17,): Done, and its candidates.
+        """The valid numbers in this scene, shape (17,): Done, and its candidates.
 
-        `info["action_mask"]` has the same as Gymnasium's spaces sample by: int8.
+        `info["action_mask"]` is the same as int8, for sampling in Gymnasium's spaces.
         """
         return self._mask.astype(bool)
 
@@ -443,7 +444,7 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
             shown = zip(_PICTURES, (goal, None, play.blocks), strict=True)
             seen: Observation = {name: self._picture(blocks).copy() for name, blocks in shown}
             if self._prompter is not None:
-                # Where a picture is sent, its name stands.
+                # The name of a picture marks its place.
                 pictures = [SentImage(b"", name, 0, 0) for name in _PICTURES]
                 messages = self._prompter.messages(self._task, pictures, self._past)
                 parts = (part for message in messages for part in message.parts)
@@ -462,12 +463,12 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
             "left": np.array([max(0.0, left)], dtype=np.float32),
         }
         if isinstance(play, _PosePlay):
-            # Of more than there are rows, those that came last.
+            # If there are more blocks than rows, the last ones.
             state["world"] = _rows(play.blocks[-MOST_BLOCKS:], MOST_BLOCKS)
         return state
 
     def _picture(self, blocks: tuple[Block, ...] | None) -> NDArray[np.uint8]:
-        """A picture of blocks, or of the candidates; those unused for longest make room."""
+        """A picture of blocks, or of the candidates, from a cache of the last ones used."""
         if blocks not in self._pictures:
             play = self._play
             drawn = play.candidates_image() if blocks is None else play.image(blocks)

@@ -1,4 +1,4 @@
-"""`phyblock export`: runs, scenes and questions as files of other tools."""
+"""`phyblock export`: runs, scenes and questions as files for other tools."""
 
 from __future__ import annotations
 
@@ -47,9 +47,10 @@ def export(
     limit: int | None,
     size_px: int,
 ) -> None:
-    """Write the records of the folder RUN, or scenes or questions with their pictures, for others.
+    """Write the records of the folder RUN, or scenes or questions with their pictures, for other
+    tools.
 
-    hf: Parquet and a card, as `datasets.load_dataset` reads a folder. csv, parquet: a row a sample.
+    hf: Parquet and a card, for `datasets.load_dataset`. csv, parquet: one row per sample.
     vlmevalkit: TSV files. lmms-eval: a folder for --include_path.
     """
     from phyblock.integrations import files, huggingface

@@ -41,12 +41,12 @@ _LMMS_UTILS = """from phyblock.integrations.files import doc_to_text, doc_to_vis
 def write_vlmevalkit(
     folder: Path, questions: str, data: str, limit: int | None, size_px: int
 ) -> tuple[Path, ...]:
-    """Write questions as two TSV files, of one right letter and of ordering; what was written.
+    """Write questions as two TSV files, multiple choice and ordering; return the paths.
 
-    Put into `$LMUData`, the first is a multiple-choice set of VLMEvalKit by its file name. Pictures
-    are base64; those of several are lists, with names in `image_path`. Raises StoreError where the
-    folder cannot be written or a file is in the way that we never wrote, DataError for a set or
-    picture that cannot be read.
+    In `$LMUData`, VLMEvalKit recognizes the first by its name as a multiple-choice set. Pictures
+    are base64; several are a list, with names in `image_path`. Raises StoreError if the folder
+    cannot be written or a file of others would be overwritten, DataError for an unreadable set or
+    picture.
     """
     out = OutFolder(folder)
     out.check(TSV_FILES)
@@ -61,7 +61,7 @@ def write_vlmevalkit(
                 labels = [image.label for image in images]
                 coded = [base64.b64encode(image.data).decode() for image in images]
                 names = [f"{asked.id}-{label}.png" for label in labels]
-                # A picture is named by where it stands among those that are sent.
+                # A picture is named by its place among the sent ones.
                 options = [
                     f"Picture {labels.index(letter) + 1}" if is_picture_option(option) else option
                     for letter, option in zip(LETTERS, asked.options, strict=True)
@@ -74,9 +74,9 @@ def write_vlmevalkit(
 
 
 def write_lmms_eval(folder: Path, limit: int | None) -> tuple[Path, ...]:
-    """Write a task of lmms-eval for each track that asks once, for `--include_path`.
+    """Write a task of lmms-eval for each single-turn track, for `--include_path`.
 
-    Raises StoreError where the folder cannot be written.
+    Raises StoreError if the folder cannot be written.
     """
     texts = {"utils.py": _LMMS_UTILS}
     for track in _LMMS_TRACKS:
@@ -93,7 +93,7 @@ _tasks = functools.cache(tasks)
 
 
 def _task(doc: Mapping[str, str]) -> Task:
-    """Return the task that a row of lmms-eval names; those of a track are read once."""
+    """Return the task of a row of lmms-eval; the tasks of a track are read once."""
     return _tasks(doc["track"])[doc["key"]]
 
 
@@ -103,7 +103,7 @@ def doc_to_visual(doc: Mapping[str, str]) -> list[Image.Image]:
 
 
 def doc_to_text(doc: Mapping[str, str], _: object = None) -> str:
-    """Return the text of a row, behind its pictures: the prompt of a run."""
+    """Return the text of a row, to be sent after its pictures: the prompt of a run."""
     parts = (part for message in _task(doc).request().messages for part in message.parts)
     return "\n\n".join(part for part in parts if isinstance(part, str))
 

@@ -1,6 +1,6 @@
 """Scenes, questions and records as folders that `datasets.load_dataset` reads.
 
-A folder holds one Parquet file, with pictures inside, and the card that says what is in it.
+A folder holds one Parquet file, including pictures, and a card that describes it.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ counts."""
 
 
 def write_records(run: Run, folder: Path | None = None) -> tuple[Path, ...]:
-    """Write the records of a run into `folder` (export/hf in the run's); what was written.
+    """Write the records of a run into `folder` (default: export/hf in the run's); return the paths.
 
     Raises as `export_run`.
     """
@@ -53,10 +53,10 @@ def write_records(run: Run, folder: Path | None = None) -> tuple[Path, ...]:
 
 
 def write_scenes(folder: Path, data: str, limit: int | None, size_px: int) -> tuple[Path, ...]:
-    """Write the scenes of a data set with their pictures; what was written.
+    """Write the scenes of a data set with their pictures; return the paths.
 
-    Raises StoreError where the folder cannot be written or a file is in the way that we never
-    wrote, SpecError where a package is missing, DataError for a set that cannot be read.
+    Raises StoreError if the folder cannot be written or a file of others would be overwritten,
+    SpecError if a package is missing, DataError for an unreadable set.
     """
 
     def row(task: Task) -> dict[str, Any]:
@@ -79,7 +79,7 @@ def write_scenes(folder: Path, data: str, limit: int | None, size_px: int) -> tu
 def write_questions(
     folder: Path, questions: str, data: str, limit: int | None, size_px: int
 ) -> tuple[Path, ...]:
-    """Write a set of questions, or a folder's, with their pictures; raises as `write_scenes`."""
+    """Write a bundled set or folder of questions with pictures; raises as `write_scenes`."""
 
     def row(task: Task) -> dict[str, Any]:
         asked, images = task.item.question, task.request().images
@@ -100,7 +100,7 @@ def write_questions(
 
 
 def question_tasks(questions: str, data: str, limit: int | None, size_px: int) -> Iterator[Task]:
-    """Yield the questions of a bundled set or folder, with pictures of a size."""
+    """Yield the questions of a bundled set or folder, with pictures of this size."""
     given = (f"vqa.path={json.dumps(questions)}", f"images.size_px={size_px}")
     yield from tasks("vqa", *given, data=data, limit=limit)
 
@@ -108,7 +108,7 @@ def question_tasks(questions: str, data: str, limit: int | None, size_px: int) -
 def _write(
     folder: Path, rows: Iterator[dict[str, Any]], pictures: Sequence[str], title: str, about: str
 ) -> tuple[Path, ...]:
-    """Write rows, whose columns `pictures` hold a picture or a list of them, and their card."""
+    """Write rows and their card; columns in `pictures` hold a picture or a list of them."""
     needs("datasets", "hf", "hf")
     from datasets import Dataset, Image, List, utils
 

@@ -1,7 +1,7 @@
 """Tasks for Inspect: `inspect eval phyblock/full_planning --model openai/gpt-4o`.
 
 The entry point `inspect_ai` of phyblock names this module. Samples hold the keys of tasks; prompts
-are those of a run and are made as a sample begins, so that a limit draws few pictures.
+are those of a run and are made when a sample begins, so that a limit draws few pictures.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ _ROLES = {
 
 @metric
 def by_part() -> Metric:
-    """Means by level or subtask and of all, with standard errors clustered by base scene."""
+    """Means by level or subtask and over all, with standard errors clustered by base scene."""
     error = stderr(cluster="base_scene")
     found = (
         grouped(mean(), "part"),
@@ -53,25 +53,25 @@ def by_part() -> Metric:
 
 @task
 def full_planning(**options: Any) -> InspectTask:
-    """Plans: a whole plan in one reply."""
+    """Full planning: a whole plan in one reply."""
     return _task("full_planning", **options)
 
 
 @task
 def step_planning(**options: Any) -> InspectTask:
-    """Episodes: one block a reply, in the simulator."""
+    """Step planning: one block per reply, in the simulator."""
     return _task("step_planning", **options)
 
 
 @task
 def pose_planning(**options: Any) -> InspectTask:
-    """Plans that say where every block goes, carried out by physics."""
+    """Pose planning: plans with the position of every block, executed by physics."""
     return _task("pose_planning", **options)
 
 
 @task
 def vqa(**options: Any) -> InspectTask:
-    """Questions with four options on physical understanding."""
+    """Questions: four options each, on physical understanding."""
     return _task("vqa", **options)
 
 
@@ -84,9 +84,10 @@ def _task(
     items: int | None = None,
     overrides: Any = (),
 ) -> InspectTask:
-    """Return the task of a track; `items` is the limit of `phyblock.tasks`, for levels in turn.
+    """Return the task of a track; `items` is the limit of `phyblock.tasks`, spread over levels.
 
-    `-T` gives one value as itself, and several between commas as texts: `1,2` is ['1', '2'].
+    `-T` passes a single value as it is, and several separated by commas as texts: `1,2` is
+    ['1', '2'].
     """
     found = overrides if isinstance(overrides, list | tuple) else [overrides]
     if levels is not None:
@@ -113,7 +114,7 @@ def _task(
 
 
 def _chat(messages: Sequence[dict[str, Any]]) -> list[model.ChatMessage]:
-    """Return messages in OpenAI's form as Inspect has them."""
+    """Return messages in OpenAI's form as messages of Inspect."""
 
     def content(parts: Any) -> Any:
         if isinstance(parts, str):
@@ -130,7 +131,7 @@ def _chat(messages: Sequence[dict[str, Any]]) -> list[model.ChatMessage]:
 
 @solver
 def prompt_model(asked: Tasks) -> Solver:
-    """Ask as a run does; play episodes to their end."""
+    """Ask as in a run; play episodes to their end."""
 
     async def solve(state: TaskState, generate: Generate) -> TaskState:
         one = asked[str(state.sample_id)]
@@ -152,7 +153,7 @@ def prompt_model(asked: Tasks) -> Solver:
 
 @scorer(metrics={"*": [by_part()]})
 def phyblock_scorer(asked: Tasks) -> Scorer:
-    """Score by the track's own judgement; 1 in `success` says that all is right."""
+    """Score by the track's own judgement; `success` is 1 if everything is right."""
 
     async def score(state: TaskState, target: Target) -> Score:
         del target

@@ -3,7 +3,7 @@
     uvicorn --factory phyblock.integrations.openenv:app --port 8000
 
 `PHYBLOCK_TASKS` holds the arguments of `phyblock.tasks` as JSON. `openenv.yaml` and a Dockerfile
-lie beside this module, in `openenv_space`.
+are in the folder `openenv_space` beside this module.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ _MOST_SESSIONS = 64
 
 
 class PhyBlockAction(Action):
-    """The text that a model gave."""
+    """The text of a model's reply."""
 
     text: str
 
 
 class PhyBlockObservation(Observation):
-    """The messages that wait for a reply, in OpenAI's form; at the end none, and the score."""
+    """The messages to reply to, in OpenAI's form; at the end none, and the score."""
 
     key: str
     messages: tuple[dict[str, Any], ...] = ()
@@ -42,7 +42,7 @@ class PhyBlockObservation(Observation):
 
 
 class TasksInTurn(Iterator[Task]):
-    """All tasks in order, over and over, for sessions in several threads: each gets the next."""
+    """All tasks in order, repeated endlessly, shared by threads: each session gets the next."""
 
     def __init__(self, known: Tasks) -> None:
         self._lock = threading.Lock()
@@ -54,9 +54,9 @@ class TasksInTurn(Iterator[Task]):
 
 
 class PhyBlockEnvironment(Environment[PhyBlockAction, PhyBlockObservation, State]):
-    """One task an episode: asked once, or played turn by turn. Rewards sum to the score.
+    """One task per episode: a single turn, or several. Rewards sum to the score.
 
-    Environments that are given the same `in_turn` share the order of tasks.
+    Environments with the same `in_turn` share the order of tasks.
     """
 
     SUPPORTS_CONCURRENT_SESSIONS = True
@@ -74,9 +74,9 @@ class PhyBlockEnvironment(Environment[PhyBlockAction, PhyBlockObservation, State
         key: str | None = None,
         **_: Any,
     ) -> PhyBlockObservation:
-        """Begin a task: that of a key, of the seed's place, else the next in turn.
+        """Begin a task: that of a key, that at the seed's place, else the next in turn.
 
-        In a finite set, places are counted round; in a stream, that of a place is made again.
+        In a finite set, places wrap around; in a stream, the task at a place is made on demand.
         """
         if key is not None:
             self._task = self._known[key]
@@ -92,7 +92,7 @@ class PhyBlockEnvironment(Environment[PhyBlockAction, PhyBlockObservation, State
     def step(
         self, action: PhyBlockAction, timeout_s: float | None = None, **_: Any
     ) -> PhyBlockObservation:
-        """Take a reply; RuntimeError before a reset and after the end."""
+        """Take a step with a reply. Raises RuntimeError before a reset and after the end."""
         del timeout_s
         if self._task is None:
             raise RuntimeError("reset() begins a task")
@@ -131,7 +131,7 @@ class PhyBlockClient(EnvClient[PhyBlockAction, PhyBlockObservation, State]):
 
 
 def tasks_of_environment() -> Tasks:
-    """Return the tasks that `PHYBLOCK_TASKS` names; SpecError where it does not."""
+    """Return the tasks of `PHYBLOCK_TASKS`. Raises SpecError if it is not valid."""
     text = os.environ.get("PHYBLOCK_TASKS", '{"track": "full_planning"}')
     try:
         given = json.loads(text)

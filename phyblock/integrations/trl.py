@@ -25,10 +25,10 @@ _FEATURES = {
 def dataset(tasks: Tasks) -> Dataset:
     """Return a finite set as rows: `prompt`, `images` in the order of its picture parts, `key`.
 
-    ValueError for a stream and for episodes, which TRL's trainers do not take.
+    Raises ValueError for streams and episodes, which TRL's trainers do not accept.
     """
     if tasks.is_endless or any(task.plays for task in tasks):
-        raise ValueError(f"{tasks!r} cannot be rows: a finite set of what is asked once can")
+        raise ValueError(f"{tasks!r} cannot be rows: use a finite set without episodes")
 
     def parts(content: str | Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
         if isinstance(content, str):

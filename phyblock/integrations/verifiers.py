@@ -1,7 +1,8 @@
 """A taskset for verifiers: `vf-eval phyblock --env.taskset.track full_planning`.
 
-Plans, plans with poses and questions are asked once; episodes are conversations, in which the
-world answers as the user. Rewards are made of the trace alone, so that it can be scored again.
+Plans, plans with poses and questions take one turn; episodes are conversations, in which the
+simulator answers as the user. Rewards are computed from the trace alone, so that it can be scored
+again.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ __all__ = ["VerifiersEnv", "VerifiersTaskset"]
 
 
 class VerifiersConfig(vf.TasksetConfig):
-    """Arguments of `phyblock.tasks`; without a limit, `train` and `dev` have no end."""
+    """Arguments of `phyblock.tasks`; without a limit, `train` and `dev` are endless."""
 
     track: Literal["full_planning", "step_planning", "pose_planning", "vqa"] = "full_planning"
     split: Split = "train"
@@ -37,19 +38,19 @@ class VerifiersConfig(vf.TasksetConfig):
 
 
 class VerifiersData(vf.TaskData):
-    """A task by its place in what the configuration gives."""
+    """A task by its place in the configured tasks."""
 
     place: int
     source: VerifiersConfig
 
 
 class VerifiersTask(vf.Task[VerifiersData, vf.State, vf.TaskConfig]):
-    """A task, and the worth of what was said."""
+    """A task, with its rewards."""
 
     asked: Task | None = None
 
     def found(self) -> Task:
-        """Return the task of phyblock; of a trace that was stored, made again."""
+        """Return the task of phyblock, made again for a stored trace."""
         if self.asked is None:
             self.asked = self.data.source.read()[self.data.place]
         return self.asked
@@ -67,7 +68,7 @@ class VerifiersTask(vf.Task[VerifiersData, vf.State, vf.TaskConfig]):
 
     @vf.metric
     async def success(self, trace: vf.Trace) -> float:
-        """1 if all is right."""
+        """1 if everything is right."""
         return float((await asyncio.to_thread(self.worth, trace)).success)
 
 
@@ -79,7 +80,7 @@ class VerifiersTaskset(vf.Taskset[VerifiersTask, VerifiersConfig]):
         self.INFINITE = config.split != "test" and config.limit is None
 
     def load(self) -> Iterator[VerifiersTask]:
-        """Yield tasks, each made when it is asked for."""
+        """Yield tasks, each made on demand."""
         for place, one in enumerate(self.config.read()):
             system, *messages = one.messages()
             data = VerifiersData(
@@ -96,13 +97,13 @@ class VerifiersTaskset(vf.Taskset[VerifiersTask, VerifiersConfig]):
 
 
 class VerifiersEnvConfig(vf.EnvConfig):
-    """One model, without tools: it runs no code, and needs no sandbox."""
+    """One model, without tools: it runs no code and needs no sandbox."""
 
     agent: vf.AgentConfig = vf.AgentConfig(harness={"id": "null"}, runtime={"type": "subprocess"})
 
 
 class VerifiersEnv(vf.Env[VerifiersEnvConfig]):
-    """Asks once, or plays the world of an episode."""
+    """Asks a single turn, or plays the simulator of an episode."""
 
     async def run(self, task: VerifiersTask, agents: Any) -> None:
         """Run a task to its end."""

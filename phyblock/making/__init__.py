@@ -1,5 +1,5 @@
-"""Making data for phyblock: scenes, candidate sets and questions, and checks of what was made.
+"""Making data for phyblock: scenes, candidate sets and questions, and their checks.
 
 Nothing that runs, scores or reports imports this package; `phyblock scenes` and
-`phyblock questions` load it when they are called.
+`phyblock questions` load it on demand.
 """

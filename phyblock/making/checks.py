@@ -1,4 +1,4 @@
-"""Checks of scenes by geometry and physics: one list for making, verifying and auditing sets."""
+"""Checks of scenes by geometry and physics, used to make, verify and audit sets."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ from phyblock.text import csv_cell
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that is wrong with a scene, and the one sentence that says so.
+    """One problem of a scene, with a sentence that describes it.
 
-    `blocks` are orders of blocks, 0 the ground. `field` is where the file says `found`; `allowed`
-    is what geometry, physics or a limit says instead. `value_mm` was measured, and up to
-    `tolerance_mm` would have passed.
+    `blocks` are orders of blocks, 0 the ground. `field` is the place of `found` in the file;
+    `allowed` is the value by geometry, physics or a limit. `value_mm` was measured, and a value up
+    to `tolerance_mm` would pass.
     """
 
     scene: str
@@ -60,8 +60,8 @@ class Finding:
 class Tolerances:
     """Limits: overlaps and gaps up to `fit_m` [m], movement within the limits of a trial.
 
-    The finished structure is watched to the end of the `trial`, or until it is at rest for
-    `quiet_s` [s]. Each step before is tried at the first of its time steps.
+    The finished structure is simulated to the end of the `trial`, or until it is at rest for
+    `quiet_s` [s]. Each earlier step is tried at the first of the trial's time steps.
     """
 
     fit_m: float = FIT_TOLERANCE_M
@@ -72,7 +72,7 @@ class Tolerances:
 OURS = Tolerances()
 """For scenes made here."""
 FOREIGN = Tolerances(fit_m=0.002, quiet_s=0.5)  # 2 mm cannot be seen in a picture.
-"""For scenes made elsewhere, whose positions are written by hand in rounded millimeters."""
+"""For scenes made elsewhere, with positions written by hand in rounded millimeters."""
 
 
 class Limits(NamedTuple):
@@ -94,7 +94,7 @@ LEVEL_LIMITS: dict[int, Limits] = {
 
 @dataclass(frozen=True)
 class SceneFacts:
-    """A scene with what its checks go by; without `candidates` checks of them find nothing."""
+    """A scene with cached facts for its checks; without `candidates` their checks find nothing."""
 
     scene: Scene
     candidates: CandidateSet | None = None
@@ -103,7 +103,7 @@ class SceneFacts:
 
     @cached_property
     def contacts(self) -> Mapping[int, frozenset[int]]:
-        """For each block, by its order, the orders that it rests on; the ground only alone.
+        """For each block, by its order, the orders that it rests on; the ground only by itself.
 
         Empty for a block that touches nothing below it.
         """
@@ -123,7 +123,7 @@ class SceneFacts:
 
 
 def declared_supports(scene: Scene) -> Mapping[int, frozenset[int]]:
-    """Return the orders that each block rests on as the file says; the ground only alone."""
+    """Return the declared orders that each block rests on; the ground only by itself."""
     return {block.order: frozenset(block.depend or {GROUND}) for block in scene.blocks}
 
 
@@ -162,7 +162,7 @@ def _layer(facts: SceneFacts) -> Iterator[Finding]:
 
 
 def _order(facts: SceneFacts) -> Iterator[Finding]:
-    """Blocks that stand in the file before one that they depend on."""
+    """Blocks that come in the file before one that they depend on."""
     placed: set[int] = set()
     for block in facts.scene.blocks:
         if early := sorted(set(block.depend) - placed):
@@ -173,7 +173,7 @@ def _order(facts: SceneFacts) -> Iterator[Finding]:
 
 
 def _hidden(facts: SceneFacts) -> Iterator[Finding]:
-    """Blocks of which too little shows in the goal picture, of the picture or of their outline."""
+    """Blocks too little of which is visible in the goal picture, by area or outline."""
     hidden = hidden_blocks(facts.scene)
     for order in hidden:
         yield facts.finding("hidden", f"block {order} does not show in the goal picture", order)
@@ -202,7 +202,7 @@ def _floating(facts: SceneFacts) -> Iterator[Finding]:
 
 
 def _dependencies(facts: SceneFacts, check: str) -> Iterator[Finding]:
-    """Contacts that carry and are not declared, or what is declared without contact."""
+    """Supporting contacts that are not declared, or declared dependencies without contact."""
     declared_of, is_undeclared = declared_supports(facts.scene), check == "undeclared dependency"
     for i, order in enumerate(declared_of):
         contacts, declared = facts.contacts[order], declared_of[order]
@@ -240,7 +240,7 @@ def _fall(facts: SceneFacts, check: str, when: str, shown: Stability) -> Finding
 
 
 def _candidates(facts: SceneFacts) -> Iterator[Finding]:
-    """More candidates than a set may hold, and blocks that none of them can stand for."""
+    """Too many candidates, and blocks without a candidate."""
     if facts.candidates is None:
         return
     if len(facts.candidates) > MAX_CANDIDATES:
@@ -252,7 +252,7 @@ def _candidates(facts: SceneFacts) -> Iterator[Finding]:
 
 
 def _distractor(facts: SceneFacts) -> Iterator[Finding]:
-    """Candidates that are not needed in poses that no design knows: these give themselves away."""
+    """Distractors in poses that no design uses, which give themselves away."""
     needed = {block.look for block in facts.scene.blocks}
     for i, one in enumerate(facts.candidates.candidates if facts.candidates else ()):
         poses = {orientation_class(one.type, euler) for euler in POSES[one.type].values()}
@@ -280,11 +280,11 @@ CHECKS: dict[str, Callable[[SceneFacts], Iterable[Finding]]] = {
     "candidates": _candidates,
     "distractor": _distractor,
 }
-"""The checks of a scene by itself, cheap ones first, and causes before their effects."""
+"""The checks of a single scene, cheap ones first, and causes before their effects."""
 FORM = tuple(CHECKS)[:4]
 """Checks without geometry."""
 PHYSICS = tuple(CHECKS)[5:11]
-"""Overlaps, floating blocks, wrong dependencies, and what does not stand."""
+"""Overlaps, floating blocks, wrong dependencies, and falls."""
 VERIFIED = tuple(name for name in CHECKS if name != "palette")
 """Checks of a scene that was made here, with its candidates."""
 AUDITED = (*PHYSICS, "layer", "order", "candidates")
@@ -292,7 +292,7 @@ AUDITED = (*PHYSICS, "layer", "order", "candidates")
 
 
 def findings_of(facts: SceneFacts, names: Iterable[str]) -> Iterator[Finding]:
-    """Yield the findings of these checks, each computed when it is asked for.
+    """Yield the findings of these checks, each computed on demand.
 
     Raises SimulationError as the simulator does.
     """
@@ -301,8 +301,8 @@ def findings_of(facts: SceneFacts, names: Iterable[str]) -> Iterator[Finding]:
 
 
 def is_acceptable(scene: Scene, palette: tuple[Kind, ...]) -> bool:
-    """True if a scene could enter a data set: proven to stand, so that no engine lets it fall, and
-    each of its blocks to be seen in the goal picture. It ends at the first fault.
+    """True if a scene could enter a data set: proven to stand, so that it falls in no engine, and
+    with each of its blocks visible in the goal picture. The check ends at the first fault.
     """
     facts = SceneFacts(scene, palette=palette)
     found = findings_of(facts, (*FORM, "hidden", *PHYSICS))
@@ -313,12 +313,12 @@ Task = tuple[Scene, CandidateSet | None]
 
 
 def verify_scene(task: Task) -> tuple[Finding, ...]:
-    """Return what is wrong with a scene made here and its candidate set."""
+    """Return the findings about a scene made here and its candidate set."""
     return tuple(findings_of(SceneFacts(*task), VERIFIED))
 
 
 def audit_scene(task: Task, tolerances: Tolerances = FOREIGN) -> tuple[Finding, ...]:
-    """Return what is wrong with a scene made elsewhere and, if there is one, its candidate set."""
+    """Return the findings about a scene made elsewhere and its candidate set, if any."""
     return tuple(findings_of(SceneFacts(*task, tolerances), AUDITED))
 
 

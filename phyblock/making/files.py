@@ -25,22 +25,22 @@ SCENE_FILES = ("README.md", "scenes.jsonl", VERSION_FILE)
 QUESTION_FILES = ("CARD.md", "questions.jsonl", VERSION_FILE)
 """Card, lines and version of a set."""
 SCENE_SET_VERSION = 4
-"""Counts what makes other scenes or candidate sets out of the same seed: 2 offers distractors as
-often as goals need them, and shows at least 3 % of every block's outline; 3 holds nothing that
-the built-in set has; 4 holds finished structures alone that are proven to stand.
+"""Increased whenever the same seed makes other scenes or candidate sets: 2 offers distractors as
+often as goals need them, and shows at least 3 % of every block's outline; 3 excludes scenes of the
+built-in set; 4 accepts only finished structures that are proven to stand.
 """
 QUESTION_SET_VERSION = 8
-"""Raised whenever questions of a name ask something else, so that no results are mixed."""
+"""Increased whenever questions with the same name change, so that results are never mixed."""
 _Tasks = Sequence[tuple[Scene, CandidateSet]]
 
 
 def check_out(folder: Path, names: Sequence[str]) -> None:
-    """Raise StoreError when the folder holds files of these names already."""
+    """Raise StoreError if the folder already holds files of these names."""
     check_free([folder / name for name in (*names, SUMS_FILE)], "give another --out")
 
 
 def write_scenes(folder: Path, tasks: _Tasks, card: str) -> None:
-    """Write scenes with their candidate sets, sorted by id; StoreError where it cannot."""
+    """Write scenes with their candidate sets, sorted by id. Raises StoreError if that fails."""
     by_id = sorted(tasks, key=lambda task: task[0].id)
     lines = (StoredScene.of(scene, candidates).as_json() for scene, candidates in by_id)
     _write(folder, SCENE_FILES, card, lines, SCENE_SET_VERSION)
@@ -67,12 +67,12 @@ def _write(
 
 
 def sums_text(folder: Path, names: Sequence[str]) -> str:
-    """Checksums of files, as `sha256sum -c` reads them."""
+    """Return checksums of files in the format of `sha256sum -c`."""
     return "".join(f"{hex_digest((folder / name).read_bytes())}  {name}\n" for name in names)
 
 
 def check_sums(folder: Path) -> tuple[int, tuple[Problem, ...]]:
-    """The number of files that `SHA256SUMS` names, and those that are missing or changed."""
+    """Return the number of files in `SHA256SUMS`, and problems of missing or changed ones."""
     path = folder / SUMS_FILE
     if not path.is_file():
         return 1, (Problem(str(path), "is missing"),)
@@ -89,7 +89,7 @@ def check_sums(folder: Path) -> tuple[int, tuple[Problem, ...]]:
 
 
 def _card(template: str, /, **facts: object) -> str:
-    """A card of `cards/`, a Jinja template, with its facts filled in."""
+    """Return a card from a Jinja template in `cards/`, filled with facts."""
     text = (Path(__file__).parent / "cards" / f"{template}.md").read_text(encoding="utf-8")
     environment = Environment(undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
     return environment.from_string(text).render(simulator=other_engine(), **facts) + "\n"
@@ -117,7 +117,7 @@ def scene_card(name: str, tasks: _Tasks, command: str, palette: Palette, rejecte
 
 
 def completed_card(name: str, count: int, command: str) -> str:
-    """Return the Markdown card of scenes that were given by their positions."""
+    """Return the Markdown card of scenes that were completed from positions."""
     text = _card("completed", name=name, count=count, command=command)
     return text + _card("scenes_file")
 
@@ -127,7 +127,7 @@ def _bases(scenes: Sequence[Scene]) -> int:
 
 
 def _row(scenes: Sequence[Scene]) -> list[str]:
-    """Numbers of scenes and base scenes; mean and most of blocks, types, colors and layers."""
+    """Return numbers of scenes, base scenes; mean and maximum of blocks, types, colors, layers."""
     counts = [
         (len(one), *(len({kind[i] for kind in _kinds(one)}) for i in (0, 1)), max(one.graph.layers))
         for one in scenes
@@ -157,8 +157,8 @@ def question_card(name: str, scenes_name: str, questions: Sequence[Question], co
 
 
 def _shares(questions: Sequence[Question]) -> list[object]:
-    """Numbers of questions, scenes and wordings; shares of the letters, and of the answer that is
-    right most often, where options are texts.
+    """Return numbers of questions, scenes and wordings; shares of the letters, and of the most
+    frequent answer if options are texts.
     """
     count = len(questions)
     letters = Counter(question.answer[0] for question in questions)

@@ -1,7 +1,7 @@
-"""Seasons: a set that nobody could choose or know before, and that anyone can make again.
+"""Seasons: a set that nobody can choose or know in advance, and that anyone can make again.
 
 A maker publishes the digests of a secret and of the code, then waits for a value that nobody
-controls, such as a beacon's. The seed of the set is the digest of both.
+controls, such as that of a beacon. The seed of the set is a digest of the secret and the value.
 """
 
 from __future__ import annotations
@@ -24,19 +24,19 @@ _Digest = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
 
 
 class Commitment(Line, extra="forbid"):
-    """All that is settled before a season; to be published."""
+    """Everything that is fixed before a season; to be published."""
 
     secret_sha256: _Digest
     code_sha256: _Digest
     engine: str
     arguments: str
-    """Of `phyblock scenes generate`, but for seed and folder."""
+    """Arguments of `phyblock scenes generate`, except seed and folder."""
     public: str
-    """The later public value that counts, in words."""
+    """The later public value to use, in words."""
 
 
 def code_digest() -> str:
-    """Return the digest of the package's own files and the built-in scenes, by their names."""
+    """Return the digest of the package's own files and the built-in scenes, with their names."""
     root = Path(phyblock.__file__).parent
     files = (path for path in root.rglob("*") if path.suffix in (".py", ".md", ".yaml"))
     named = sorted((path.relative_to(root).as_posix(), path) for path in files)
@@ -46,7 +46,7 @@ def code_digest() -> str:
 
 
 def season_seed(commitment: Commitment, secret: str, public: str, where: str) -> int:
-    """Return the seed of a season; DataError where secret, code or engine are not those meant."""
+    """Return the seed of a season. Raises DataError for another secret, code or engine."""
     meant = (
         ("secret_sha256", commitment.secret_sha256, hex_digest(secret)),
         ("code_sha256", commitment.code_sha256, code_digest()),

@@ -1,8 +1,8 @@
 """Backgrounds: the floor behind the blocks, the shadow on it, and the colors drawn over it.
 
 The floor is the plane z = 0, colored by casting a ray through every pixel. Wood, concrete and lawn
-are seamless square textures, made from integer hashes and filtered noise, and kept at every halving
-of their size. A background is a row of `GROUNDS` and a name in `phyblock.types.Background`.
+are seamless square textures, made from integer hashes and filtered noise, and stored as mipmaps. A
+background is a row of `GROUNDS` and a name in `phyblock.types.Background`.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ _SOFTNESS = 340  # Pictures are this many times as wide as the blur at the edge 
 
 
 def _wood(pale: tuple[int, int, int], deep: tuple[int, int, int], seed: int) -> Colors:
-    """Boards along x, each with a tone and a grain of its own, and thin joints between them."""
+    """Boards along x, each with its own tone and grain, and thin joints between them."""
     width = _SIZE // _PLANKS
     board = np.arange(_SIZE) // width
     tone = (_hashed(seed, _PLANKS)[board] - 0.5)[:, None]
@@ -137,10 +137,10 @@ def _to_floor(camera: Camera, size_px: int) -> tuple[NDArray[np.float32], NDArra
 
 @dataclass(frozen=True)
 class Ground:
-    """A background: the share of light that a shadow takes, 0..1, and colors.
+    """A background: the share of light that a shadow removes, 0..1, and colors.
 
-    `ink` is the color of writing, `line` of the grid between candidates, `rim` of the lines where
-    blocks end at the floor. The floor is drawn by `paint`, or is a `texture`.
+    `ink` is the color of text, `line` of the grid between candidates, `rim` of outlines between
+    blocks and floor. The floor is drawn by `paint`, or is a `texture`.
     """
 
     shadow: float
@@ -164,7 +164,7 @@ GROUNDS: dict[Background, Ground] = {
 
 
 def add_background(name: str, ground: Ground) -> None:
-    """Add a background. Raises ValueError for a name that is taken."""
+    """Add a background. Raises ValueError if the name is taken."""
     if name in GROUNDS:
         raise ValueError(f"there is a background of this name: {name}")
     GROUNDS[cast(Background, name)] = ground
@@ -187,7 +187,7 @@ def floor(background: Background, camera: Camera, size_px: int) -> NDArray[np.fl
 
 
 def shadow(background: Background, shaded: NDArray[np.bool_]) -> NDArray[np.float32]:
-    """Share of light left on the floor, shape (size, size, 1), 0..1, by where it is `shaded`."""
+    """Share of light left on the floor, shape (size, size, 1), 0..1, from the mask `shaded`."""
     mask = Image.fromarray(shaded.astype(np.uint8) * np.uint8(255))
     soft = np.asarray(mask.filter(ImageFilter.GaussianBlur(len(shaded) / _SOFTNESS)), np.float32)
     return soft[..., None] * np.float32(-GROUNDS[background].shadow / 255.0) + np.float32(1.0)
@@ -195,7 +195,7 @@ def shadow(background: Background, shaded: NDArray[np.bool_]) -> NDArray[np.floa
 
 @functools.cache
 def surface_map(background: Background) -> tuple[NDArray[np.uint8], ...]:
-    """The texture, then halved again and again, each (n, n, 3), 0..255, rows along y."""
+    """The texture and its repeated halvings, each (n, n, 3), 0..255, rows along y."""
     texture = GROUNDS[background].texture
     assert texture is not None
     maps = [texture().astype(np.float32).clip(0, 255)]
@@ -205,10 +205,10 @@ def surface_map(background: Background) -> tuple[NDArray[np.uint8], ...]:
 
 
 def sample(background: Background, x_m: Grid, y_m: Grid, footprint_m: Grid) -> NDArray[np.float32]:
-    """Colors of a texture at points, shape (..., 3), no finer than what each pixel sees [m]."""
+    """Colors of a texture at points, shape (..., 3), no finer than the pixel's footprint [m]."""
     maps = surface_map(background)
     texel_m = PERIOD_M / _SIZE
-    # The nearest power of two: borders lie half way between powers, and need no logarithm.
+    # The nearest power of two: borders are half way between powers, and need no logarithm.
     borders = np.sqrt(2.0) * texel_m * np.ldexp(1.0, np.arange(len(maps) - 1))
     level = np.searchsorted(borders.astype(np.float32), footprint_m).astype(np.int8)
     colors = np.empty((*x_m.shape, 3), dtype=np.float32)

@@ -1,17 +1,17 @@
-"""Statics: can blocks stand as they are, and with how much to spare.
+"""Statics: proofs that blocks stand or fall, with a margin.
 
 Blocks stand when forces in their contacts can bear every weight: each force inside the cone of
-friction, all forces and moments of a block in balance. That is a set of linear equations in
-forces that only push, each cone as a pyramid of four edges. Where such forces exist, rigid bodies
-may stand; where none exist, they cannot. Least squares find them in most cases, linear programming
-settles the rest.
+friction, all forces and moments of a block in balance. That is a set of linear equations in forces
+that only push, with each cone as a pyramid of four edges. If such forces exist, rigid bodies can
+stand; if none exist, they cannot. Least squares find them in most cases, linear programming decides
+the rest.
 
-`surely_stands` and `surely_falls` ask so with all weights off by up to `MARGIN_M` to any side and
-long blocks heavier or lighter, with all that lies between, so that no verdict hangs on an edge
-that a weight is nearly over. Weights alone do not tell a block that rests on two edges with nothing
-over them, so what stands has to stand on smaller contacts too: those that are left wherever two
-blocks are off by up to the margin from one another. `prove` gives the forces, or the motion of a
-fall, for `certificate` to check, which trusts nothing here but the contacts.
+`surely_stands` and `surely_falls` require this with all weights shifted by up to `MARGIN_M` to any
+side and long blocks heavier or lighter, and everything in between, so that no verdict depends on a
+weight that is nearly over an edge. Shifted weights do not detect a block that rests on two edges
+with no area over them, so blocks also have to stand on smaller contacts: those that remain if two
+blocks are off by up to the margin from one another. `prove` returns the forces, or the motion of a
+fall, for `certificate` to check, which trusts only the contacts computed here.
 """
 
 from __future__ import annotations
@@ -47,13 +47,13 @@ from phyblock.sim.geometry import cross
 Floats = NDArray[np.float64]
 
 MARGIN_M = round(certificate.MARGIN / certificate.ONE, 9)
-"""Distance by which every weight may be off its place [m]."""
+"""Distance by which every weight may be shifted [m]."""
 FRICTIONS = (certificate.LITTLE / 100, certificate.MUCH / 100)
-"""The least and the most friction that a verdict has to hold under."""
+"""The least and the most friction for which a verdict has to hold."""
 MASS_FACTORS = (certificate.LIGHT / 100, certificate.HEAVY / 100)
-"""Long blocks may have so many times their mass at the least, and at the most."""
+"""The least and the most mass of long blocks, as a multiple of their own."""
 SHIFTS_M = np.array(certificate.SHIFTS) / certificate.ONE
-"""Corners round all places (x, y) that a weight may have beside its own [m]."""
+"""Corners of a polygon around all shifts (x, y) of a weight [m]."""
 _LEAST_VERTICAL = 0.15
 _TOLERANCE = 1e-5
 _UP = np.array([0.0, 0.0, 1.0])
@@ -61,25 +61,25 @@ _STEEP = 0.9
 _SAME_GAP_M, _NEARLY_SAME_M = 1e-4, 1e-3
 _EXACT, _RIDGE = 1e-11, 1e-9
 _LITTLE, _MUCH = FRICTIONS[0] - 1e-7, FRICTIONS[1] + 1e-7
-"""Beyond what is proven, as numbers of proofs are rounded."""
+"""Slightly beyond the proven range, since numbers of proofs are rounded."""
 _ROUNDS = 6
 _KEPT = 1 << 15
 
 
 def is_balanced(blocks: Sequence[Block], lean: tuple[float, float] = (0.0, 0.0)) -> bool:
-    """True if contacts can bear all weights as they are, on a floor whose slope is `lean`."""
+    """True if contacts can bear all weights as they are, on a floor with the slope `lean`."""
     weights = _weights(blocks, up=np.array([*lean, 1.0]))
     forces = _matrix(_contacts(blocks), len(blocks), FRICTION)
     return _pushes(forces, weights[:, None]) is not None
 
 
 def surely_stands(blocks: Sequence[Block]) -> bool:
-    """True if blocks are in balance with a margin of `MARGIN_M`, little friction, any masses."""
+    """True if blocks are in balance with a margin of `MARGIN_M`, low friction and any masses."""
     return _borne(blocks) is not None
 
 
 def surely_falls(blocks: Sequence[Block]) -> bool:
-    """True if blocks fall with weights off by up to `MARGIN_M`, much friction, any masses."""
+    """True if blocks fall with weights off by up to `MARGIN_M`, high friction and any masses."""
     forces = _matrix(_contacts(blocks), len(blocks), FRICTIONS[1])
     if not forces.size:
         return bool(blocks)
@@ -87,7 +87,7 @@ def surely_falls(blocks: Sequence[Block]) -> bool:
 
 
 class Proven(NamedTuple):
-    """Blocks as a proof takes them, and the proof."""
+    """The structure of a proof, and the proof."""
 
     structure: Structure
     proof: Stands | Falls
@@ -99,15 +99,15 @@ class Proven(NamedTuple):
 
 
 def prove(blocks: Sequence[Block]) -> Proven | None:
-    """Return a proof that blocks stand or fall, which was checked; None: statics leave it open.
+    """Return a checked proof that blocks stand or fall; None if statics cannot decide.
 
-    Nothing is proven of blocks that overlap, for they push one another apart.
+    Nothing is proven about blocks that overlap, since they push one another apart.
     """
     return prove_standing(blocks) or prove_fall(blocks)
 
 
 def prove_standing(blocks: Sequence[Block]) -> Proven | None:
-    """Return a proof that blocks stand, which was checked, or None."""
+    """Return a checked proof that blocks stand, or None."""
     if not blocks or find_overlaps(blocks):
         return None
     if (borne := _borne(blocks)) is None:
@@ -123,7 +123,7 @@ def prove_standing(blocks: Sequence[Block]) -> Proven | None:
 
 
 def prove_fall(blocks: Sequence[Block]) -> Proven | None:
-    """Return a proof that blocks fall, which was checked, or None."""
+    """Return a checked proof that blocks fall, or None."""
     if not blocks or find_overlaps(blocks):
         return None
     wide = _contacts(blocks, -MARGIN_M)
@@ -137,10 +137,10 @@ def prove_fall(blocks: Sequence[Block]) -> Proven | None:
 
 
 def _borne(blocks: Sequence[Block]) -> list[tuple[_Contacts, Floats]] | None:
-    """The contacts as they are, and narrower, each with shares of forces (k, m) that bear its part
-    of `certificate.LOADS`; None where there are none.
+    """The contacts as they are, and narrower, each with forces (k, m) that bear its part of
+    `certificate.LOADS`; None if there are none.
 
-    Of two shifts, or masses, that can be borne, what lies between is borne by the mean of their
+    Everything between two shifts, or masses, that can be borne is borne by the mean of their
     forces.
     """
     found: list[tuple[_Contacts, Floats]] = []
@@ -155,13 +155,13 @@ def _borne(blocks: Sequence[Block]) -> list[tuple[_Contacts, Floats]] | None:
 
 
 def _pushes(forces: Floats, weights: Floats) -> Floats | None:
-    """Return the shares of forces, (k, m), that balance weights (6 n, m); None if none do."""
+    """Return the forces, (k, m), that balance weights (6 n, m); None if none do."""
     if not forces.size:
         return None if weights.size else np.zeros((0, weights.shape[1]))
     pushes, is_borne = _least_squares(forces, weights)
     for number in np.flatnonzero(~is_borne):
         weight, used = weights[:, number], np.ones(forces.shape[1], dtype=bool)
-        # Without what would have to pull, others may push enough.
+        # Without the forces that would have to pull, others may push enough.
         for _ in range(_ROUNDS):
             used &= pushes[:, number] > 0
             some, is_found = _least_squares(forces[:, used], weight[:, None])
@@ -178,10 +178,10 @@ def _pushes(forces: Floats, weights: Floats) -> Floats | None:
 
 
 def _least_squares(forces: Floats, weights: Floats) -> tuple[Floats, NDArray[np.bool_]]:
-    """The least sum of squares of pushes (k, m) and pulls that bears weights, and True for each
-    that it does bear, without a pull.
+    """The pushes (k, m) and pulls with the least sum of squares that bear weights, and True for
+    each weight that they bear without a pull.
     """
-    # SciPy takes a third of a second to import, which a run that asks nobody does without.
+    # SciPy takes a third of a second to import, and a run without requests does not need it.
     from scipy.linalg import cho_factor, cho_solve  # type: ignore[import-untyped]
 
     square = forces @ forces.T
@@ -194,11 +194,10 @@ def _least_squares(forces: Floats, weights: Floats) -> tuple[Floats, NDArray[np.
 
 
 def _least_imbalance(blocks: Sequence[Block], forces: Floats) -> Any:
-    """The solution of a linear program: what forces leave unborne of weights off by up to
-    `MARGIN_M`, at the least.
+    """The solution of a linear program: the least imbalance of weights off by up to `MARGIN_M`.
 
-    It has forces as its unknowns, and the weight of all long blocks, and of all others, at each
-    corner of `SHIFTS_M`: their sum is the mass, their mean the place.
+    Its unknowns are forces, and the weight of all long blocks, and of all others, at each corner of
+    `SHIFTS_M`: their sum is the mass, their mean the place.
     """
     others, whole = (
         np.column_stack([_weights(blocks, at_m, mass) for at_m in SHIFTS_M]) for mass in (0.0, 1.0)
@@ -213,7 +212,7 @@ def _least_imbalance(blocks: Sequence[Block], forces: Floats) -> Any:
 def _least_residual(
     unknown: Floats, target: Floats, limits: tuple[Floats, Floats] | None = None
 ) -> Any:
-    """The solution of linear programming, which always ends, for the least residual, as a sum."""
+    """The solution of a linear program for the least sum of residuals, which always exists."""
     from scipy import sparse  # type: ignore[import-untyped]
     from scipy.optimize import linprog  # type: ignore[import-untyped]
 
@@ -240,9 +239,9 @@ def _weights(
     long: float = 1.0,
     up: Floats = _UP,
 ) -> Floats:
-    """The force up that each block needs, and its moment, shape (6 n,); all plain ones weigh 1.
+    """The upward force that each block needs, and its moment, shape (6 n,), if all others weigh 1.
 
-    Long blocks have so many times their mass.
+    Long blocks have `long` times their mass.
     """
     kg = np.array([SHAPES[b.type].mass_kg for b in blocks])
     factors = np.array([long if SHAPES[b.type].is_long else 1.0 for b in blocks])
@@ -261,8 +260,8 @@ def _centers_m(blocks: Sequence[Block]) -> Floats:
 
 
 class _Contacts(NamedTuple):
-    """Corners of contacts: who pushes whom (the ground is -1), places (k, 3) [m], and directions
-    (k, 3, 3): the normal, from one to the other, and two at right angles to it.
+    """Corners of contacts: the pushing and the pushed block (the ground is -1), places (k, 3) [m],
+    and directions (k, 3, 3): the normal, from one to the other, and two at right angles to it.
     """
 
     below: NDArray[np.int64]
@@ -272,7 +271,7 @@ class _Contacts(NamedTuple):
     is_wide: bool
 
     def edges(self, friction: float) -> Floats:
-        """Edges of a pyramid in the cone of friction of each, or, of a wide one, round it."""
+        """Edges of a pyramid inside the friction cone of each, or around it if that is wide."""
         ways = (
             [(1, 1), (1, -1), (-1, 1), (-1, -1)]
             if self.is_wide
@@ -282,7 +281,7 @@ class _Contacts(NamedTuple):
 
 
 def _contacts(blocks: Sequence[Block], margin_m: float = 0.0) -> _Contacts:
-    """All contacts of blocks, narrower by a margin, or wider where it is negative."""
+    """All contacts of blocks, narrower by a margin, or wider if it is negative."""
     is_wide = margin_m < 0
     found = [
         (certificate.GROUND, i, corners, _UP)
@@ -334,7 +333,7 @@ def _exact(vectors: Floats) -> tuple[certificate.Vector, ...]:
 
 
 def _bodies(blocks: Sequence[Block]) -> tuple[Body, ...]:
-    """Blocks as a proof takes them."""
+    """Blocks as bodies of a proof."""
     kg = [SHAPES[block.type].mass_kg for block in blocks]
     weights = [round(one / sum(kg) * certificate.ONE) for one in kg]
     is_long = [SHAPES[block.type].is_long for block in blocks]
@@ -342,7 +341,7 @@ def _bodies(blocks: Sequence[Block]) -> tuple[Body, ...]:
 
 
 def _stated(met: _Contacts) -> tuple[Contact, ...]:
-    """Contacts as a proof takes them."""
+    """Contacts as contacts of a proof."""
     normals, *sides = (_exact(met.axes[:, axis]) for axis in range(3))
     who = (met.below.tolist(), met.above.tolist())
     return tuple(map(Contact, *who, _exact(met.places_m), normals, zip(*sides, strict=True)))
@@ -350,12 +349,12 @@ def _stated(met: _Contacts) -> tuple[Contact, ...]:
 
 @functools.lru_cache(maxsize=_KEPT)
 def _on_floor(block: Block) -> tuple[Floats, ...]:
-    """Corners of a block's contact with the ground; empty where there is none."""
+    """Corners of a block's contact with the ground; empty if there is none."""
     points = np.vstack([piece.vertices_m for piece in pieces_of(block)])
     if points[:, 2].min() >= CONTACT_TOLERANCE_M:
         return ()
     foot = points[points[:, 2] < points[:, 2].min() + CONTACT_TOLERANCE_M]
-    # The points that lie farthest out in sixteen directions.
+    # The outermost points in sixteen directions.
     angles = np.arange(16) * math.pi / 8 + 0.01
     reach = foot[:, :2] @ np.stack([np.cos(angles), np.sin(angles)])
     return (foot[sorted(set(reach.argmax(axis=0).tolist()))],)
@@ -365,8 +364,8 @@ def _on_floor(block: Block) -> tuple[Floats, ...]:
 def _between(
     one: Turned, other: Turned, way_m: tuple[float, float, float], margin_m: float
 ) -> tuple[tuple[Floats, Floats], ...]:
-    """Corners and normal of each contact of two blocks, from the first one's place, the normal
-    from it on.
+    """Corners of each contact of two blocks, from the place of the first, and its normal, away
+    from the first.
     """
     met, is_wide = [], margin_m < 0
     for first, second, axes in piece_pairs(at(one), at(other, way_m)):
@@ -374,7 +373,7 @@ def _between(
             continue
         near_m = _NEARLY_SAME_M if is_wide else _SAME_GAP_M
         best = axes.directions[axes.gaps_m > axes.gap_m - near_m]
-        # A fall needs all directions that blocks may push in; a balance takes the one most upright.
+        # A fall needs all possible directions of a push; a balance uses the most upright one.
         if not is_wide:
             best = best[[int(np.argmax(np.abs(best[:, 2])))]]
             best = best[np.abs(best[:, 2]) >= _LEAST_VERTICAL]

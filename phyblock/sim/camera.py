@@ -1,4 +1,4 @@
-"""Cameras: views by name or angle, and framing that cuts off nothing of what is framed.
+"""Cameras: views by name or angle, and framing that cuts nothing off.
 
 For the axes of a view, "every point lies inside this window of the picture" is a set of linear
 inequalities in the camera's position, so the closest camera that sees everything is a closed form.
@@ -25,7 +25,7 @@ FIELD_OF_VIEW_DEG = 30.0  # Vertical and horizontal field of view; pictures are 
 _HALF_TANGENT = _half_tangent(FIELD_OF_VIEW_DEG)
 _DEPTH_MARGIN_M = 0.02
 _NEARER = 0.9
-_LEAST_DEPTH_M = 0.05  # What is drawn and not framed is not nearer to the camera than this.
+_LEAST_DEPTH_M = 0.05  # Least distance from the camera of points that are drawn but not framed.
 
 VIEWS: dict[View, tuple[float, float]] = {
     "oblique": (45.0, 22.0),
@@ -67,7 +67,7 @@ class Camera:
 
     @property
     def half_tangent(self) -> float:
-        """Half the width of what is seen at a depth, as a share of that depth."""
+        """Half the visible width at a depth, as a share of that depth."""
         return _half_tangent(self.field_of_view_deg)
 
     def project(self, points_m: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -89,7 +89,7 @@ class Camera:
         return np.subtract.outer(-down, -across).astype(np.float32)
 
     def width_m(self, depth_m: float) -> float:
-        """Width of what the picture shows at a depth [m]."""
+        """Visible width at a depth [m]."""
         return 2 * depth_m * self.half_tangent
 
 
@@ -111,8 +111,8 @@ def frame(
 ) -> Camera:
     """The closest camera with these axes that sees all points (n, 3), one at least, in the window.
 
-    It stays at least `min_distance_m` [m] from the nearest. `drawn_m` (k, 3) is all that is drawn,
-    where that is more: it may reach out of the window, but lies between the camera's planes.
+    It stays at least `min_distance_m` [m] from the nearest. `drawn_m` (k, 3) are all drawn points,
+    if they are more: they may lie outside of the window, but between the camera's planes.
     """
     right, up, forward = turned(points_m, axes).T
     spans = []

@@ -1,14 +1,14 @@
-"""Proofs that blocks stand or fall, and a checker of them that needs integers alone.
+"""Proofs that blocks stand or fall, and a checker of them that needs only integers.
 
 Every number is an exact rational: an integer over `ONE`. Places are in meters, forces and weights
-in the weight of the whole. `balance` writes down a `Structure`, as blocks touch, and finds proofs
-in floating point; nothing of how they were found has to be trusted.
+in units of the total weight. `balance` describes the blocks and contacts as a `Structure` and finds
+proofs in floating point; the search does not have to be trusted.
 
-`Stands` holds forces, inside the cones of friction, that bear all weights but for a billionth, with
-long blocks lighter or heavier: where all weights together are off by `MARGIN` to any side, and
-where they are in place and every contact is narrower by the margin. `Falls` holds a motion of every
+`Stands` holds forces, inside the friction cones, that bear all weights up to a billionth, with long
+blocks lighter or heavier: once with all weights together shifted by `MARGIN` to any side, and once
+with weights in place and every contact narrower by the margin. `Falls` holds a motion of every
 block that releases energy, and that no force in any contact, made wider by the margin, works
-against (Farkas' lemma): a balance would take forces that add up to `_STRONGEST` times the weight.
+against (Farkas' lemma): a balance would need forces that sum to `_STRONGEST` times the weight.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from typing import NamedTuple
 ONE = 2**40
 Vector = tuple[int, int, int]
 MARGIN = ONE * 5 // 1000
-"""Distance by which weights may be off their places, and blocks off one another [m]."""
+"""Distance by which weights, and contacts of blocks, may be off [m]."""
 LITTLE, MUCH = 28, 45
 """The least and the most friction [percent]."""
 LIGHT, HEAVY = 87, 115
@@ -31,15 +31,15 @@ SHIFTS = tuple(
     for x, y in product((-_FAR, -_HALF, 0, _HALF, _FAR), repeat=2)
     if (abs(x), abs(y)) in ((_FAR, 0), (0, _FAR), (_HALF, _HALF))
 )
-"""Corners of an octagon round all places that a weight may have."""
+"""Corners of an octagon around all shifts of a weight."""
 LOADS = (*product(SHIFTS, (HEAVY, LIGHT), (False,)), *product(((0, 0),), (HEAVY, LIGHT), (True,)))
-"""Shift of all weights, mass of long blocks, and True where contacts are narrow."""
+"""Shift of all weights, mass of long blocks, and True for narrow contacts."""
 GROUND = -1
 _REMAINDER, _STRONGEST = 10**9, 10**5
 
 
 class Body(NamedTuple):
-    """A block: its share of all weight, and the center of it."""
+    """A block: its share of the total weight, and its center of mass."""
 
     weight: int
     is_long: bool
@@ -47,8 +47,8 @@ class Body(NamedTuple):
 
 
 class Contact(NamedTuple):
-    """A place where a body, or the ground, may push another, with unit vectors: the normal from
-    one to the other, and two at right angles to it.
+    """A place where a body, or the ground, may push another, with three unit vectors: the normal,
+    from one to the other, and two at right angles to it.
     """
 
     below: int
@@ -74,7 +74,7 @@ class Stands(NamedTuple):
 
 
 class Falls(NamedTuple):
-    """The velocity of each body where it passes the origin, and its spin."""
+    """The velocity of each body at the origin, and its angular velocity."""
 
     motion: tuple[tuple[Vector, Vector], ...]
 
@@ -105,7 +105,7 @@ def _is_square(axes: tuple[Vector, ...]) -> bool:
 def _bears(
     structure: Structure, load: tuple[tuple[int, int], int, bool], forces: Sequence[Vector]
 ) -> bool:
-    """True if forces keep within friction, and leave no more of a load than the remainder."""
+    """True if forces are within friction, and bear a load up to the allowed remainder."""
     shift, mass, is_narrow = load
     contacts = structure.narrow if is_narrow else structure.contacts
     if len(forces) != len(contacts):
@@ -130,7 +130,7 @@ def _bears(
 
 
 def _releases(structure: Structure, motion: Sequence[tuple[Vector, Vector]]) -> bool:
-    """True if a motion releases more energy than forces in the contacts could take up."""
+    """True if a motion releases more energy than forces in the contacts could absorb."""
     if len(motion) != len(structure.bodies):
         return False
     against = 0
@@ -139,7 +139,7 @@ def _releases(structure: Structure, motion: Sequence[tuple[Vector, Vector]]) -> 
         if contact.below != GROUND:
             other = _velocity(motion[contact.below], contact.place)
             away = (away[0] - other[0], away[1] - other[1], away[2] - other[2])
-        # The most friction in a direction that is between the sides, and beyond.
+        # An upper bound of friction in directions between the sides.
         aside = sum(abs(_dot(away, side)) for side in contact.sides)
         against = max(against, MUCH * aside - 100 * _dot(away, contact.normal))
     released = []

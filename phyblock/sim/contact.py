@@ -19,8 +19,8 @@ from phyblock.domain.blocks import BlockType, Euler, euler_deg_to_matrix
 from phyblock.domain.scene import Block
 from phyblock.sim.geometry import ConvexPiece, collision_pieces, corners_m, cross
 
-GROUND = 0  # Stands for the ground where orders of blocks are named, as in the files.
-FIT_TOLERANCE_M = 0.0005  # Overlaps and gaps up to this are not worth a word [m].
+GROUND = 0  # The order of the ground, as in the files.
+FIT_TOLERANCE_M = 0.0005  # Overlaps and gaps up to this are ignored [m].
 CONTACT_TOLERANCE_M = 0.0015  # Blocks closer than this touch [m].
 _MAX_CONTACT_OVERLAP_M = 0.003
 _MIN_VERTICAL = 0.7
@@ -35,7 +35,7 @@ Floats = NDArray[np.float64]
 
 @functools.lru_cache(maxsize=_KEPT)
 def bounds_m(block: Block) -> Floats:
-    """Low and high corner of the box round a block, shape (2, 3) [m], world frame; read-only."""
+    """Low and high corner of the box around a block, shape (2, 3) [m], world frame; read-only."""
     corners = corners_m(block.type, block.position_m, block.euler_deg)
     box: Floats = np.stack([corners.min(axis=0), corners.max(axis=0)])
     box.setflags(write=False)
@@ -43,7 +43,7 @@ def bounds_m(block: Block) -> Floats:
 
 
 def whole_bounds_m(blocks: Iterable[Block]) -> Floats:
-    """Low and high corner of the box round all blocks, one at least, shape (2, 3) [m]."""
+    """Low and high corner of the box around all blocks, at least one, shape (2, 3) [m]."""
     boxes = np.stack([bounds_m(block) for block in blocks])
     return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
 
@@ -56,7 +56,7 @@ def boxes_near(first: Floats, second: Floats, reach_m: float) -> bool:
 
 @functools.lru_cache(maxsize=_KEPT)
 def pieces_of(block: Block) -> tuple[ConvexPiece, ...]:
-    """The convex pieces of a block where it is, world frame."""
+    """The convex pieces of a block at its pose, world frame."""
     rotation, position_m = euler_deg_to_matrix(block.euler_deg), np.array(block.position_m)
     return tuple(moved(piece, rotation, position_m) for piece in collision_pieces(block.type))
 
@@ -83,7 +83,7 @@ class Axes(NamedTuple):
 
 
 def separating_axes(first: ConvexPiece, second: ConvexPiece) -> Axes:
-    """Every candidate axis of the pair, in both senses."""
+    """Every candidate axis of the pair, in both directions."""
     crossed = cross(first.edge_directions[:, None], second.edge_directions[None]).reshape(-1, 3)
     lengths = np.linalg.norm(crossed, axis=1)
     crossed = crossed[lengths > 1e-9] / lengths[lengths > 1e-9, None]
@@ -94,7 +94,7 @@ def separating_axes(first: ConvexPiece, second: ConvexPiece) -> Axes:
 
 
 def drop_m(axes: Axes) -> float | None:
-    """The fall [m] of the second piece onto the first, None when it is not above it."""
+    """The fall [m] of the second piece onto the first, or None if it is not above it."""
     vertical = axes.directions[:, 2]
     beside = np.abs(vertical) < 1e-9
     if np.any(axes.gaps_m[beside] >= -1e-9):
@@ -114,7 +114,7 @@ class Overlap(NamedTuple):
 
 
 class Gap(NamedTuple):
-    """A block (by order) that hangs `height_m` [m] above whatever it would fall on."""
+    """A block (by order) that is `height_m` [m] above what it would fall on."""
 
     order: int
     height_m: float
@@ -123,7 +123,7 @@ class Gap(NamedTuple):
 def find_overlaps(
     blocks: Sequence[Block], tolerance_m: float = FIT_TOLERANCE_M
 ) -> tuple[Overlap, ...]:
-    """Pairs of blocks that share space deeper than `tolerance_m` [m]; blocks in the ground too."""
+    """Pairs of blocks, or a block and the ground, that overlap deeper than `tolerance_m` [m]."""
     found = [Overlap(GROUND, block.order, -float(bounds_m(block)[0, 2])) for block in blocks]
     for first, second in _near_pairs(blocks, 0.0):
         depth_m = -min(axes.gap_m for axes in pair_axes(first, second))
@@ -158,7 +158,8 @@ def support_graph(blocks: Sequence[Block]) -> dict[int, frozenset[int]]:
     """For each block's order, the orders of the blocks it rests on; 0 is the ground.
 
     B rests on A when they touch in an area, or an edge on a face, whose normal points up from A to
-    B within 45 degrees. An edge on the border of a face carries only what nothing else carries.
+    B within 45 degrees. An edge on the border of a face counts only for blocks without other
+    support.
     """
     rests_on: dict[int, set[int]] = {block.order: set() for block in blocks}
     for block in blocks:
@@ -183,18 +184,18 @@ def _near_pairs(blocks: Sequence[Block], reach_m: float) -> Iterator[tuple[Block
 
 _KEPT_PAIRS = 1 << 16
 Turned = tuple[BlockType, Euler]
-"""A block by its type and angles, wherever it is."""
+"""A block by its type and angles, without its place."""
 
 
 def beside(first: Block, second: Block) -> tuple[Turned, Turned, tuple[float, float, float]]:
-    """Return all that two blocks are to one another: each as it is turned, and the way between."""
+    """Return the relation of two blocks: each one's type and angles, and the vector between."""
     (a, b, c), (x, y, z) = first.position_m, second.position_m
     way = (round(x - a, 10) + 0.0, round(y - b, 10) + 0.0, round(z - c, 10) + 0.0)
     return (first.type, first.euler_deg), (second.type, second.euler_deg), way
 
 
 def at(turned: Turned, place_m: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Block:
-    """A block that is turned so at a place, by default the origin."""
+    """A block with this type and angles at a place, by default the origin."""
     return Block(1, turned[0], "red", place_m, turned[1], (), 1)
 
 
@@ -217,19 +218,19 @@ def _axes_at_one_place(first: Turned, second: Turned) -> tuple[Axes, ...]:
 def _rises(
     first: Turned, second: Turned, way_m: tuple[float, float, float]
 ) -> tuple[tuple[float, bool], ...]:
-    """Rise of the contact of each pair of pieces that touch, and True where it is a rim's."""
+    """Rise of the contact of each pair of touching pieces, and True if it is on a rim."""
     found = (_contact_rise(*pair) for pair in piece_pairs(at(first), at(second, way_m)))
     return tuple(one for one in found if one[0])
 
 
 def piece_pairs(first: Block, second: Block) -> Iterator[tuple[ConvexPiece, ConvexPiece, Axes]]:
-    """Pairs of pieces of two blocks, with what can separate each."""
+    """Pairs of pieces of two blocks, with the axes that can separate each."""
     for one, other in product(pieces_of(first), pieces_of(second)):
         yield one, other, separating_axes(one, other)
 
 
 def _contact_rise(first: ConvexPiece, second: ConvexPiece, axes: Axes) -> tuple[float, bool]:
-    """Vertical part of the contact normal from first to second, and True where it is a rim's."""
+    """Vertical part of the contact normal from first to second, and True if it is on a rim."""
     if not -_MAX_CONTACT_OVERLAP_M <= axes.gap_m <= CONTACT_TOLERANCE_M:
         return 0.0, False
     rim = 0.0
@@ -257,10 +258,10 @@ def contact_corners_m(
 ) -> Floats:
     """Corners of the contact of two touching pieces, in the world, shape (k, 3) [m].
 
-    `direction` (3,) is the contact's normal, from the first to the second; none where they meet in
-    less than a line. With a margin [m], half of it is left out along the rims of either piece, as
-    is certain to touch where they may be off by so much from one another; with a negative one it
-    is added, as may touch then.
+    `direction` (3,) is the contact's normal, from the first to the second; no corners if they meet
+    in less than a line. With a margin [m], half of it is removed along the rims of either piece,
+    which leaves the part that touches even if the pieces are off by that much; a negative margin
+    is added, which gives the part that may touch.
     """
     lower, upper, shared, basis = _patches(first, second, direction)
     if margin_m < 0:
@@ -278,7 +279,7 @@ def contact_corners_m(
 def _patches(
     first: ConvexPiece, second: ConvexPiece, direction: Floats
 ) -> tuple[Floats, Floats, Floats, Floats]:
-    """Outlines turned to one another, the part they share, and two unit vectors of their plane."""
+    """Facing outlines, the part they share, and two unit vectors of their plane."""
     helper = np.eye(3)[int(np.argmin(np.abs(direction)))]
     right = cross(direction, helper)
     right /= np.linalg.norm(right)
@@ -293,7 +294,7 @@ def _patches(
 
 
 def _hull(points: Floats) -> Floats:
-    """Corners of the convex hull, counter-clockwise; the ends alone if it is thin as a line."""
+    """Corners of the convex hull, counter-clockwise; only the ends if it is a line."""
     if len(points) < 3:
         return points
     spread = points - points.mean(axis=0)
@@ -349,21 +350,21 @@ def _depth_inside(point: Floats, polygon: Floats) -> float:
 
 VOXEL_M = 0.005
 _SIDE = 4
-"""Points along each side of a voxel: their middles alone would not see a block that lies lower."""
+"""Points along each side of a voxel: centers alone would miss a block that is slightly lower."""
 _POINTS = _SIDE**3
 _POINT_M = VOXEL_M / _SIDE
 _SHIFT_M = _POINT_M / 2
-"""Faces of built structures lie on multiples of 1.25 mm, and no point near one."""
+"""Shift of points away from multiples of 1.25 mm, on which faces of structures lie."""
 _SKIN_M = 0.0003
-"""A point so near to a block counts as in it: what rests has shifted by a tenth of a millimeter."""
+"""A point this near to a block counts as inside, since resting blocks shift by .1 mm."""
 _SPAN = 1 << 20
 
 Voxels = tuple[NDArray[np.int64], NDArray[np.uint8]]
-"""Names of voxels (n,), and the points of each that lie in a block, a bit for each (n, 8)."""
+"""Names of voxels (n,), and a bit mask of the points of each that are in a block (n, 8)."""
 
 
 def voxel_iou(one: Sequence[Block], other: Sequence[Block]) -> float:
-    """Intersection over union of two structures as voxels; 1 for two without a block."""
+    """Intersection over union of two structures as voxels; 1 if both are empty."""
     first, second = filled_voxels(one), filled_voxels(other)
     _, a, b = np.intersect1d(first[0], second[0], assume_unique=True, return_indices=True)
     counts = (first[1], second[1], first[1][a] & second[1][b])
@@ -373,7 +374,7 @@ def voxel_iou(one: Sequence[Block], other: Sequence[Block]) -> float:
 
 
 def filled_voxels(blocks: Sequence[Block]) -> Voxels:
-    """The voxels that blocks reach into, names ascending, and which points of each they hold."""
+    """The voxels that blocks reach into, in ascending order, and the points of each inside."""
     found = [_filled(block.type, block.position_m, block.euler_deg) for block in blocks]
     if not found:
         return np.zeros(0, dtype=np.int64), np.zeros((0, _POINTS // 8), dtype=np.uint8)

@@ -1,10 +1,10 @@
-"""Blocks let go under physics: states, building orders, and plans with poses.
+"""Blocks released under physics: states, building orders, and plans with poses.
 
-Three facts save time. What is proven to stand (`balance`) needs no trial, but for finished large
-structures (`check`). Blocks that nothing brings near one another cannot disturb one another, so
-they are tried group by group (`groups`), each as if it were at the origin: whether wheels under a
-plank roll away in PyBullet hangs on the last digits of where they are. And a group that is quiet
-for a while is at rest (`moments`), for an unsupported load of .2 % of a block's weight would show.
+Three facts save time. Structures that are proven to stand (`balance`) need no trial, except large
+finished ones (`check`). Blocks that are far from one another cannot disturb one another, so they
+are tried group by group (`groups`), each as if it were at the origin: in PyBullet, the last digits
+of a position decide if wheels under a plank roll away. And a group that is quiet for a while is at
+rest (`moments`), since an unsupported load of .2 % of a block's weight would show.
 """
 
 from __future__ import annotations
@@ -41,22 +41,22 @@ class Trial:
 
 DEFAULT_TRIAL = Trial()
 ONE_SETTING = Trial(physics=DEFAULT_TRIAL.physics[:1])
-"""A trial that costs half as much as the default and decides nothing that a score rests on."""
+"""A trial at half the cost of the default, not used for scores."""
 
 
 REST_SPEED_M_S = 0.005
-"""Blocks are at rest when no corner was faster: above the jitter of contacts (up to 4 mm/s)."""
-QUIET_S = 0.25  # Time for which blocks must not be faster to be at rest [s].
+"""Blocks are at rest if no corner is faster; above the jitter of contacts (up to 4 mm/s)."""
+QUIET_S = 0.25  # Time during which no corner may be faster [s].
 _EVERY_S = 0.05
 REACH_M = 0.012  # Groups this far apart stay apart while no block passes the limits of a trial.
-_COLLAPSE_S = 3.0  # Time that fallen blocks are given to come to rest [s].
+_COLLAPSE_S = 3.0  # Time for fallen blocks to come to rest [s].
 
 
 @dataclass(frozen=True)
 class Stability:
     """Result of a trial: orders that passed a limit, the largest movement [m] and turn [degrees].
 
-    `agreed` is true where all of its settings name the same blocks.
+    `agreed` is true if all settings name the same blocks.
     """
 
     fallen: tuple[int, ...] = ()
@@ -66,7 +66,7 @@ class Stability:
 
     @classmethod
     def of(cls, parts: Sequence[Stability]) -> Stability:
-        """Combine results under each setting, or of each group."""
+        """Combine the results of settings, or of groups."""
         return cls(
             fallen=tuple(sorted({order for one in parts for order in one.fallen})),
             moved_m=max((one.moved_m for one in parts), default=0.0),
@@ -80,16 +80,16 @@ class Stability:
         return not self.fallen
 
 
-# Larger structures have tall columns, and the solver of PyBullet lets some fall that could stand.
+# Larger structures have tall columns, some of which fall in PyBullet though they could stand.
 _MOST_PROVEN = 22
 
 
 def check(
     blocks: Sequence[Block], trial: Trial = DEFAULT_TRIAL, quiet_s: float | None = None
 ) -> Stability:
-    """Let each group go and see which blocks stay, to the end or until quiet for so long.
+    """Release each group and see which blocks stay, to the end or until quiet for `quiet_s`.
 
-    None moves of a group that is proven to stand; beyond `_MOST_PROVEN` blocks all are let go.
+    Groups that are proven to stand are not simulated, up to `_MOST_PROVEN` blocks in all.
     """
     is_large = len(blocks) > _MOST_PROVEN
     parts = [group for group in groups(blocks) if is_large or not is_proven(group)]
@@ -114,7 +114,7 @@ def _try_groups(parts: Sequence[Sequence[Block]], trial: Trial, quiet_s: float |
 
 
 def is_proven(group: Sequence[Block]) -> bool:
-    """True if there is a proof that blocks stand, wherever on the ground they are."""
+    """True if there is a proof that blocks stand, independent of their place on the ground."""
     return _is_proven(_arrangement(group))
 
 
@@ -124,7 +124,7 @@ def _is_proven(blocks: tuple[Block, ...]) -> bool:
 
 
 def groups(blocks: Sequence[Block], reach_m: float = REACH_M) -> tuple[tuple[Block, ...], ...]:
-    """The blocks in groups that keep more than `reach_m` [m] of free space between them."""
+    """The blocks in groups with more than `reach_m` [m] of free space between them."""
     boxes = [bounds_m(block) for block in blocks]
     left = set(range(len(blocks)))
     touching: list[tuple[Block, ...]] = []
@@ -143,7 +143,7 @@ def groups(blocks: Sequence[Block], reach_m: float = REACH_M) -> tuple[tuple[Blo
 
 
 def movement(blocks: Sequence[Block], poses: Mapping[int, Pose], trial: Trial) -> Stability:
-    """Distance of blocks from their goal poses, and the orders of those past a limit."""
+    """Distance of blocks from their goal poses, and the orders of those beyond a limit."""
     moved = {b.order: poses[b.order].distance_m(Pose.goal(b)) for b in blocks}
     turned = {b.order: poses[b.order].angle_deg(Pose.goal(b)) for b in blocks}
     fallen = (o for o in moved if moved[o] > trial.limit_m or turned[o] > trial.limit_deg)
@@ -157,7 +157,7 @@ def wait(world: World, limit_s: float, quiet_s: float = QUIET_S) -> bool:
 
 
 def moments(world: World, limit_s: float, quiet_s: float = QUIET_S) -> Iterator[bool]:
-    """Simulate moment by moment up to `limit_s` [s]; yields True once all is at rest."""
+    """Simulate in short intervals up to `limit_s` [s]; yield True once all is at rest."""
     every_s = max(_EVERY_S, world.physics.time_step_s)
     since_s = 0.0
     for _ in range(round(limit_s / every_s)):
@@ -180,7 +180,7 @@ def _tried(world: World, group: Sequence[Block], trial: Trial, quiet_s: float | 
 
 @contextlib.contextmanager
 def _placed(world: World, blocks: Sequence[Block]) -> Iterator[None]:
-    """Blocks in a world for a while."""
+    """Keep blocks in a world for the duration of a with statement."""
     world.place(*blocks)
     try:
         yield
@@ -189,13 +189,13 @@ def _placed(world: World, blocks: Sequence[Block]) -> Iterator[None]:
             world.remove(block.order)
 
 
-_KEPT = 65_536  # Arrangements and states that are remembered, about 1 kB each.
+_KEPT = 65_536  # Cached arrangements and states, about 1 kB each.
 _PLACE_DIGITS = 6
 _ONE_AT_A_TIME = threading.Lock()
 
 
 class Settled(NamedTuple):
-    """Blocks that were let go, at their goal poses but for the `fallen`, which lie at rest."""
+    """Blocks after release, at their goal poses, except the `fallen` ones, which are at rest."""
 
     fallen: tuple[int, ...]
     blocks: tuple[Block, ...]
@@ -207,9 +207,9 @@ class Settled(NamedTuple):
 
 
 class Site:
-    """Worlds kept open to try each arrangement of a group once, wherever it is met again.
+    """Open worlds in which each arrangement of a group is tried only once.
 
-    Every block is tried at its goal pose: a verdict depends on nothing that was tried before.
+    Every block is tried at its goal pose, so that a verdict does not depend on earlier trials.
     """
 
     def __init__(self, trial: Trial = DEFAULT_TRIAL, engine: PhysicsEngine | None = None) -> None:
@@ -226,7 +226,7 @@ class Site:
         self._stack.close()
 
     def settle(self, blocks: Sequence[Block]) -> Settled:
-        """Let blocks go at their goal poses; they fall when they do under any of the settings."""
+        """Release blocks at their goal poses; they fall if they do under any setting."""
         return self._known(tuple(blocks))
 
     def stands(self, blocks: Sequence[Block]) -> bool:
@@ -238,7 +238,7 @@ class Site:
             return Settled((), blocks)
         fallen, shown = set[int](), tuple[Block, ...]()
         for physics in self.trial.physics:
-            # A fresh world: how blocks tumble could depend on what was in a used one before.
+            # A new world: how blocks tumble could depend on earlier contents of a used one.
             with World(physics, self._engine) as world:
                 world.place(*blocks)
                 wait(world, self.trial.duration_s)
@@ -263,7 +263,7 @@ class Site:
 
 
 def _arrangement(group: Sequence[Block]) -> tuple[Block, ...]:
-    """All of a group that its stability depends on: the first block at the origin, no colors."""
+    """Everything that a group's stability depends on: the first block at the origin, no colors."""
     x0, y0, _ = group[0].position_m
     kept = []
     for number, block in enumerate(group, 1):
@@ -279,12 +279,12 @@ def _shared_site(trial: Trial, engine: PhysicsEngine) -> Site:
 
 
 def settle(blocks: Sequence[Block], trial: Trial = DEFAULT_TRIAL) -> Settled:
-    """As `Site.settle`, at a site that lasts as long as the process; for any thread."""
+    """As `Site.settle`, at a site that exists as long as the process; for any thread."""
     with _ONE_AT_A_TIME:
         return _shared_site(trial, physics_engine()).settle(blocks)
 
 
-LONGEST_S = 600.0  # A plan whose execution takes longer, by the clock, is given up [s].
+LONGEST_S = 600.0  # Execution of a plan is given up after this time [s].
 _TRIES = 16
 _CM = 100.0
 _DIGITS = 3
@@ -292,7 +292,7 @@ _DIGITS = 3
 
 @dataclass(frozen=True)
 class ExecutionLimits:
-    """Most that a block may be moved out of others, and that it moves and turns where it stands."""
+    """Limits of moving a block out of others, and of movement and turn of a standing block."""
 
     overlap_cm: float = 0.5
     stand_cm: float = 1.0
@@ -301,11 +301,11 @@ class ExecutionLimits:
 
 @dataclass(frozen=True)
 class ExecutedStep:
-    """Result of a step: how far the block came to lie from the pose it was to have.
+    """Result of a step: the distance of the block at rest from its pose.
 
-    `gap_cm` is how far it was above whatever it would fall on, `overlap_cm` how far it had to be
-    moved out of others or the floor, or how deep it was refused; `knocked` are the numbers of the
-    steps whose blocks it moved, from 1.
+    `gap_cm` is its height above what it would fall on, `overlap_cm` the distance by which it was
+    moved out of others or the floor, or the depth at which it was refused; `knocked` are the
+    numbers of the steps whose blocks it moved, from 1.
     """
 
     end: StepEnd
@@ -318,14 +318,14 @@ class ExecutedStep:
 
 @dataclass(frozen=True)
 class Execution:
-    """Result of a plan: its steps, and the blocks, by step, where they lie after each of them."""
+    """Result of a plan: its steps, and the poses of blocks after each of them."""
 
     steps: tuple[ExecutedStep, ...]
     worlds: tuple[tuple[Block, ...], ...]
 
     @property
     def blocks(self) -> tuple[Block, ...]:
-        """The blocks in the end."""
+        """The final blocks."""
         return self.worlds[-1] if self.worlds else ()
 
 
@@ -334,9 +334,9 @@ def execute(
     limits: ExecutionLimits | None = None,
     engine: PhysicsEngine | None = None,
 ) -> Execution:
-    """Put blocks at their poses, one after another; None stands for a step that names no block.
+    """Put blocks at their poses, one after another; None is a step that names no block.
 
-    Raises SimulationError where the engine cannot be used, or after `LONGEST_S`.
+    Raises SimulationError if the engine cannot be used, or after `LONGEST_S`.
     """
     give_up_s = time.monotonic() + LONGEST_S
     steps: list[ExecutedStep] = []
@@ -354,10 +354,10 @@ class Executor:
     """Execution of a plan with poses, step by step; a context manager.
 
     A block that overlaps others by no more than a tolerance is moved out the shortest way, and one
-    that hangs in the air by no more is lowered; one that overlaps more stays out. It is let go with
-    blocks near it alone; others join as soon as something that fell comes near. Where a step moves
-    nothing past the limits of `DEFAULT_TRIAL`, all is set back, so that no step is judged by
-    earlier drift.
+    that floats by no more is lowered; one that overlaps more is refused. It is released together
+    with only the blocks near it; others join when something that fell comes near. If a step moves
+    nothing beyond the limits of `DEFAULT_TRIAL`, all poses are restored, so that drift does not
+    affect later steps.
     """
 
     def __init__(
@@ -377,11 +377,11 @@ class Executor:
 
     @property
     def blocks(self) -> tuple[Block, ...]:
-        """The blocks where they lie now, each with the number of its step as its order."""
+        """The blocks at their current poses, with the numbers of their steps as orders."""
         return tuple(self._resting.values())
 
     def step(self, block: Block | None) -> ExecutedStep:
-        """Put a block where it is, if there is room for it, and let it go."""
+        """Put a block at its pose, if there is room for it, and release it."""
         self._steps += 1
         if block is None:
             return ExecutedStep("no_block")
@@ -413,7 +413,7 @@ class Executor:
         return ExecutedStep(end, moved_cm, turned_deg, gap, given, knocked)
 
     def _let_go(self, block: Block) -> dict[int, Pose]:
-        """Poses of the block and of all that it could move, once they rest."""
+        """Poses at rest of the block and of all others that it could move."""
         self._resting[block.order] = block
         apart = groups(self.blocks)
         near: tuple[Block, ...] = ()
@@ -425,7 +425,7 @@ class Executor:
             others = tuple(b for b in self.blocks if b not in near)
             with _placed(self._world, near):
                 reached = self._watched(near, others, DEFAULT_TRIAL.duration_s)
-                # What has not fallen by then stands: an engine may let it creep on for ever.
+                # Blocks that have not fallen by then stand: an engine may let them creep forever.
                 if not reached and movement(near, self._world.poses(), DEFAULT_TRIAL).fallen:
                     reached = self._watched(near, others, _COLLAPSE_S)
                 after = self._world.poses()
@@ -435,7 +435,7 @@ class Executor:
         return after
 
     def _watched(self, near: Sequence[Block], others: Sequence[Block], limit_s: float) -> set[int]:
-        """Let blocks go until they rest or come near others, whose orders are returned."""
+        """Simulate blocks until they rest or come near others; return the orders of those."""
         before = self._world.poses()
         for is_quiet in moments(self._world, limit_s):
             after = self._world.poses()

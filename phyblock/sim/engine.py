@@ -1,7 +1,7 @@
 """Physics engines behind one protocol, in terms of blocks on a floor, and the choice of one.
 
-The floor is the plane z = 0; poses are those of body frames. Blocks are let go in PyBullet where it
-is installed, in MuJoCo elsewhere; the environment variable `PHYBLOCK_PHYSICS` chooses by name.
+The floor is the plane z = 0; poses are those of body frames. PyBullet is used if it is installed,
+else MuJoCo; the environment variable `PHYBLOCK_PHYSICS` chooses by name.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class Pose:
 
     @classmethod
     def goal(cls, block: Block) -> Pose:
-        """The pose that the scene gives the block."""
+        """The goal pose of the block."""
         return cls(np.array(block.position_m), euler_deg_to_quat_xyzw(block.euler_deg))
 
     def distance_m(self, other: Pose) -> float:
@@ -61,7 +61,7 @@ class Pose:
         return math.degrees(2 * math.acos(cosine))
 
     def put(self, block: Block) -> Block:
-        """The block put here, its place and angles rounded to 0.1 mm and 0.01 degrees."""
+        """The block at this pose, with place and angles rounded to 0.1 mm and 0.01 degrees."""
         x, y, z = (round(float(place), _POSITION_DIGITS) + 0.0 for place in self.position_m)
         euler = quat_xyzw_to_euler_deg(self.quat_xyzw)
         a, b, c = (round(angle, _ANGLE_DIGITS) + 0.0 for angle in euler)
@@ -84,8 +84,8 @@ def quat_xyzw_to_euler_deg(quat_xyzw: NDArray[np.float64]) -> Euler:
 class Physics:
     """Settings of a simulation.
 
-    Time step [s], iterations of the contact solver in each step, friction coefficient of any two
-    bodies that touch, gravity [m/s2], and types of which every block has so many times its mass.
+    Time step [s], iterations of the contact solver per step, friction coefficient of any two
+    touching bodies, gravity [m/s2], and factors of the mass of blocks by type.
     """
 
     time_step_s: float = 1 / 240
@@ -101,52 +101,52 @@ class Physics:
 
 
 class Velocity(NamedTuple):
-    """Velocity of a block's center of mass [m/s], and its spin [rad/s]."""
+    """Velocity of a block's center of mass [m/s], and its angular velocity [rad/s]."""
 
     linear_m_s: Vector
     angular_rad_s: Vector
 
 
 class Simulation(Protocol):
-    """Rigid blocks on a floor by number; the same calls on one machine give the same bits."""
+    """Rigid blocks on a floor, by number; the same calls on one machine give the same bits."""
 
     def add(self, number: int, block_type: BlockType, pose: Pose) -> None:
-        """Put a block at a pose, at rest; its number is above 0 and not taken."""
+        """Add a block at a pose, at rest; its number is above 0 and unused."""
 
     def remove(self, number: int) -> None:
-        """Take a block out."""
+        """Remove a block."""
 
     def step(self, n: int) -> None:
         """Simulate `n` time steps."""
 
     def pose(self, number: int) -> Pose:
-        """Return the pose of a block now."""
+        """Return the current pose of a block."""
 
     def velocity(self, number: int) -> Velocity:
-        """Return the velocity of a block now."""
+        """Return the current velocity of a block."""
 
 
 class PhysicsEngine(Protocol):
-    """A way to simulate; any number of its simulations may be open at once."""
+    """A physics engine; any number of its simulations may be open at once."""
 
     def __hash__(self) -> int:
-        """Results are kept by engine."""
+        """Engines are hashable, since results are cached by engine."""
 
     @property
     def name(self) -> str:
-        """Its name in `ENGINES`, and in what is written about a run."""
+        """Its name in `ENGINES`, and in the files of runs."""
 
     def open(self, physics: Physics) -> AbstractContextManager[Simulation]:
-        """Open a floor without blocks until the context is left; SimulationError where none is."""
+        """Open a floor without blocks for the context. Raises SimulationError if that fails."""
 
 
 PHYSICS_VARIABLE = "PHYBLOCK_PHYSICS"
 REFERENCE_ENGINE = "pybullet"
-"""The engine that the built-in data were made with; records without an engine are its."""
+"""The engine of the built-in data, and of records that name no engine."""
 
 
 class KnownEngine(NamedTuple):
-    """The class of an engine in the module of its name, its distribution, and how to get that."""
+    """The class of an engine in the module of its name, its distribution, and install hint."""
 
     factory: str
     distribution: str
@@ -161,16 +161,16 @@ ENGINES: Mapping[str, KnownEngine] = {
         "MujocoEngine", "mujoco-core", "pip install 'phyblock[mujoco]', for Python 3.11 and newer"
     ),
 }
-"""The physics engines by the names of their libraries; the first installed is the usual one."""
+"""The physics engines by the names of their libraries; the first installed is the default."""
 
 
 def installed_engines() -> tuple[str, ...]:
-    """Names of the engines whose libraries are installed; nothing is imported."""
+    """Return the names of engines whose libraries are installed; nothing is imported."""
     return tuple(name for name in ENGINES if find_spec(name) is not None)
 
 
 def physics_engine() -> PhysicsEngine:
-    """Return the engine that `PHYBLOCK_PHYSICS` names, or the usual one; else InputError."""
+    """Return the engine of `PHYBLOCK_PHYSICS`, or the default. Raises InputError if missing."""
     usual = next(iter(installed_engines()), REFERENCE_ENGINE)
     name = os.environ.get(PHYSICS_VARIABLE, usual)
     if name not in ENGINES:
@@ -189,7 +189,7 @@ def _made(name: str) -> PhysicsEngine:
 
 
 def described_engine() -> str:
-    """The engine in use and its version, as in `pybullet 3.2.7`; raises as `physics_engine`."""
+    """Return the engine in use and its version, `pybullet 3.2.7`; raises as `physics_engine`."""
     name = physics_engine().name
     return f"{name} {engine_version(name)}"
 
@@ -199,12 +199,12 @@ def engine_version(name: str) -> str:
     """The installed version of an engine's library."""
     try:
         return importlib.metadata.version(ENGINES[name].distribution)
-    except importlib.metadata.PackageNotFoundError:  # Some builds of MuJoCo are one distribution.
+    except importlib.metadata.PackageNotFoundError:  # Some builds have another name.
         return importlib.metadata.version(name)
 
 
 def other_engine() -> str:
-    """The engine in use, for messages, where it is not that of the built-in data; else empty."""
+    """Return the engine in use, for messages, or "" if it is that of the built-in data."""
     is_usual = physics_engine().name == REFERENCE_ENGINE
     return "" if is_usual else f"the physics engine {described_engine()}"
 
@@ -227,7 +227,7 @@ class World:
         self._stack.close()
 
     def place(self, *blocks: Block) -> None:
-        """Put blocks at their goal poses, at rest; last digits that machines differ in are cut."""
+        """Put blocks at their goal poses, at rest, rounded to digits that machines agree on."""
         for block in blocks:
             goal = Pose.goal(block)
             pose = Pose(rounded(goal.position_m), rounded(goal.quat_xyzw))
@@ -235,7 +235,7 @@ class World:
             self._blocks[block.order] = block
 
     def remove(self, order: int) -> None:
-        """Take a block out."""
+        """Remove a block."""
         self._simulation.remove(order)
         del self._blocks[order]
 
@@ -254,9 +254,9 @@ class World:
         return fastest
 
     def pose(self, order: int) -> Pose:
-        """Return the pose of a block now."""
+        """Return the current pose of a block."""
         return self._simulation.pose(order)
 
     def poses(self) -> dict[int, Pose]:
-        """Return the poses of all blocks now, by order."""
+        """Return the current poses of all blocks, by order."""
         return {order: self.pose(order) for order in self._blocks}

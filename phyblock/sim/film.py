@@ -1,7 +1,7 @@
-"""Films for people: an assembly step by step, an episode with what was tried.
+"""Films for people: an assembly step by step, an episode with its attempts.
 
-One camera, which frames the finished structure, sees every step. A frame of an episode shows the
-goal, the candidates with the one that was tried, and the assembly after it.
+One camera, which frames the finished structure, shows every step. A frame of an episode shows the
+goal, the candidates with the attempted one marked, and the assembly after it.
 """
 
 from __future__ import annotations
@@ -32,14 +32,14 @@ _GAP = 0.02
 _STEP_MS, _END_MS = 650, 2200
 _INK: dict[Tone, Rgb] = {"plain": (40, 44, 52), "good": (28, 122, 52), "bad": (192, 32, 32)}
 _RING: dict[Tone, Rgb] = {"plain": (230, 232, 236), "good": (64, 214, 96), "bad": (255, 64, 64)}
-"""Round a candidate, on a dark floor or a light one."""
+"""Colors of the ring around a candidate, by tone."""
 _STRIP = 0.13
 _FRAME = 0.012
 _FRAME_MS, _LAST_FRAME_MS = 900, 2600
 
 
 def assembly_gif(scene: Scene, style: PictureStyle) -> bytes:
-    """The assembly in the stored order as a GIF; DataError where that is none."""
+    """The assembly in the stored order as a GIF. Raises DataError if that order is not valid."""
     camera = goal_camera(scene, style)
     if not scene.graph.is_valid(range(len(scene))):
         message = "places a block before one that it depends on"
@@ -50,7 +50,7 @@ def assembly_gif(scene: Scene, style: PictureStyle) -> bytes:
 
 
 def _gif(images: Sequence[Image.Image], each_ms: int, last_ms: int, colorful: Image.Image) -> bytes:
-    """Images shown for so long each [ms], over and over."""
+    """An animated GIF of images with these durations [ms], which repeats."""
     palette = colorful.quantize(256, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
     images = [one.quantize(palette=palette, dither=Image.Dither.NONE) for one in images]
     buffer, times_ms = io.BytesIO(), [each_ms] * (len(images) - 1) + [last_ms]
@@ -61,9 +61,9 @@ def _gif(images: Sequence[Image.Image], each_ms: int, last_ms: int, colorful: Im
 
 @dataclass(frozen=True)
 class FilmStep:
-    """One frame: its caption and tone, the candidate that it is about, and the blocks then.
+    """One frame: its caption and tone, its candidate, and the blocks at that time.
 
-    `note` has no room in a picture.
+    `note` is not drawn.
     """
 
     caption: str
@@ -76,7 +76,7 @@ class FilmStep:
 def episode_images(
     scene: Scene, candidates: CandidateSet, steps: Sequence[FilmStep], style: PictureStyle
 ) -> list[Image.Image]:
-    """A frame a step: three squares of the style's size under a strip with the caption."""
+    """One frame per step: three squares of the style's size under a strip with the caption."""
     side, lookout = style.size_px, Lookout(scene, style)
     gap, strip = max(2, round(side * _GAP)), math.ceil(side * _STRIP)
     font = ImageFont.load_default(size=strip * 0.6)
@@ -103,8 +103,8 @@ def episode_images(
 
 
 def episode_gif(images: Sequence[Image.Image]) -> bytes:
-    """Frames as an animated GIF that repeats for ever, the last one longer."""
-    # Frames of every tone have a part in the colors: the first, the middle and the last ones.
+    """Frames as an animated GIF that repeats forever, with a longer last frame."""
+    # The palette is made from frames of every tone: the first, the middle and the last ones.
     chosen = [images[0], images[len(images) // 2], images[-1]]
     width, height = images[0].size
     step = height + max(2, round(height * _GAP))

@@ -1,13 +1,13 @@
-"""Geometry of the blocks: meshes, convex pieces, and exact sums for whatever decides a pixel.
+"""Geometry of the blocks: meshes, convex pieces, and reproducible arithmetic for pictures.
 
-From the profile of a prism in `SHAPES` follow a closed triangle mesh for mass properties, a finer
-one for pictures, and the convex pieces of physics and contact tests. Curved sides are polygons: a
-smooth cylinder rolls away where an 18-gon stands. Pictures show them round.
+The profile of a prism in `SHAPES` gives a closed triangle mesh for mass properties, a finer one for
+pictures, and the convex pieces of physics and contact tests. Curved sides are polygons: a smooth
+cylinder rolls away where an 18-gon stands. Pictures show them round.
 
-Matrix products go to a BLAS, which adds up in another order, and with fused operations, on another
-machine; trigonometric functions differ by a unit in the last place from one C library to the next.
-Plain numpy arithmetic in 64 bits is the same everywhere, and so are pictures that follow from it
-(`dot`, `cross`, `turned`, `unit`) and from a few angles whose sines were rounded (`rounded`).
+Matrix products use a BLAS, which sums in another order, and with fused operations, on other
+machines; trigonometric functions differ in the last digit between C libraries. Plain numpy
+arithmetic in 64 bits is the same everywhere, and so are pictures made only with it (`dot`, `cross`,
+`turned`, `unit`) and with a few rounded sines (`rounded`).
 """
 
 from __future__ import annotations
@@ -42,14 +42,14 @@ def dot(one: Vectors, other: Vectors) -> Vectors:
 
 
 def cross(one: Vectors, other: Vectors) -> Vectors:
-    """Vector products along the last axis, as `np.cross`, in a third of its time."""
+    """Vector products along the last axis, as `np.cross` but three times as fast."""
     a, b, c = one[..., 0], one[..., 1], one[..., 2]
     x, y, z = other[..., 0], other[..., 1], other[..., 2]
     return np.stack([b * z - c * y, c * x - a * z, a * y - b * x], axis=-1)
 
 
 def turned(points: Vectors, matrix: Vectors) -> Vectors:
-    """The matrix (3, 3) applied to points (..., 3), as `points @ matrix.T` is."""
+    """The matrix (3, 3) applied to points (..., 3), as in `points @ matrix.T`."""
     return np.stack([dot(points, row) for row in matrix], axis=-1)
 
 
@@ -59,12 +59,12 @@ def unit(vectors: Vectors) -> Vectors:
 
 
 def rounded(numbers: Vectors) -> Vectors:
-    """Numbers to 12 decimals, where C libraries agree; a zero has no sign."""
+    """Numbers to 12 decimals, on which C libraries agree; zeros have no sign."""
     return np.round(numbers, _DIGITS) + 0.0
 
 
 def significant(number: float) -> float:
-    """A number to 12 significant digits, where machines agree."""
+    """A number to 12 significant digits, on which machines agree."""
     return float(f"{number:.{_DIGITS}g}")
 
 
@@ -175,7 +175,7 @@ def principal_inertia_m2(block_type: BlockType) -> tuple[float, float, float]:
 
 @functools.cache
 def drawn_mesh(block_type: BlockType) -> Mesh:
-    """The surface as pictures show it: as `solid_mesh`, but finer where the block is round."""
+    """The surface in pictures: as `solid_mesh`, but finer if the block is round."""
     shape = SHAPES[block_type]
     mesh = _mesh(shape, shape.drawn or shape.profile)
     return Mesh(rounded(mesh.vertices_m), mesh.triangles)
@@ -250,13 +250,13 @@ _CM = 100.0
 
 
 def center_cm(block: Block) -> tuple[float, float, float]:
-    """The middle of the box round a block where it is [cm]."""
+    """The center of the box around a block at its pose [cm]."""
     x, y, z = (np.array(block.position_m) + _box_middle_m(block.type, block.euler_deg)) * _CM
     return float(x), float(y), float(z)
 
 
 def box_height_cm(block: Block) -> float:
-    """The height of the box round a block as it is turned [cm]."""
+    """The height of the box around a block in its orientation [cm]."""
     heights = corners_m(block.type, (0.0, 0.0, 0.0), block.euler_deg)[:, 2]
     return float(np.ptp(heights)) * _CM
 
@@ -264,13 +264,13 @@ def box_height_cm(block: Block) -> float:
 def origin_m(
     block_type: BlockType, euler_deg: Euler, center_cm: tuple[float, float, float]
 ) -> tuple[float, float, float]:
-    """Return where the body frame [m] of a block is whose box has its middle at a place [cm]."""
+    """Return the origin of the body frame [m] of a block whose box has this center [cm]."""
     x, y, z = np.array(center_cm) / _CM - _box_middle_m(block_type, euler_deg)
     return float(x), float(y), float(z)
 
 
 def put(step: PoseStep, candidates: CandidateSet) -> Block | None:
-    """The block that a step puts, as turned as its candidate; None where it names none."""
+    """The block of a step, in the orientation of its candidate; None if it names none."""
     if not 1 <= step.candidate <= len(candidates):
         return None
     candidate = candidates[step.candidate]
@@ -280,7 +280,7 @@ def put(step: PoseStep, candidates: CandidateSet) -> Block | None:
 
 @functools.lru_cache(maxsize=4096)
 def _box_middle_m(block_type: BlockType, euler_deg: Euler) -> NDArray[np.float64]:
-    """The middle of the box round a block whose body frame is at the origin, shape (3,) [m]."""
+    """The center of the box around a block with its body frame at the origin, shape (3,) [m]."""
     corners = corners_m(block_type, (0.0, 0.0, 0.0), euler_deg)
     middle: NDArray[np.float64] = (corners.min(axis=0) + corners.max(axis=0)) / 2
     middle.setflags(write=False)

@@ -1,8 +1,8 @@
 """MuJoCo as a physics engine, where PyBullet has no wheels; loaded when a simulation is opened.
 
-Structures stand as in PyBullet with four substeps in each time step; contacts stiff enough not to
-creep, but not so stiff that they burst where facets meet edge to edge; the elliptic cone of
-friction; collision pieces moved inward by a hair, so that blocks side by side do not touch.
+Structures stand as in PyBullet with these settings: four substeps per time step; contacts stiff
+enough not to creep, but not so stiff that they burst where facets meet edge to edge; the elliptic
+friction cone; collision pieces shrunk slightly, so that blocks side by side do not touch.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ Floats = NDArray[np.float64]
 
 
 class MujocoEngine:
-    """Opens simulations, each with data of its own."""
+    """Opens simulations, each with its own data."""
 
     name = "mujoco"
 
@@ -50,7 +50,7 @@ def _loaded() -> ModuleType:
     import mujoco
 
     def ignore(_message: str) -> None:
-        """Warnings are looked up after each step."""
+        """Do nothing: warnings are checked after each step."""
 
     mujoco.set_mju_user_warning(ignore)
     return cast(ModuleType, mujoco)
@@ -58,7 +58,7 @@ def _loaded() -> ModuleType:
 
 @dataclass
 class _Body:
-    """A block; `place` (7,): position [m], quaternion w x y z; `motion` (6,): m/s, own rad/s."""
+    """A block; `place` (7,): position [m], quaternion w x y z; `motion` (6,): m/s, body rad/s."""
 
     type: BlockType
     place: Floats
@@ -71,12 +71,12 @@ class _Body:
 
     @property
     def center_m(self) -> Floats:
-        """From its frame's origin to its center of mass, in the world, shape (3,) [m]."""
+        """Vector from its frame's origin to its center of mass, in the world, shape (3,) [m]."""
         return self.rotation @ np.array(SHAPES[self.type].center_of_mass_m)
 
 
 class _Simulation:
-    """Blocks on a plane, as `Simulation`; another model is begun where a block comes or goes."""
+    """Blocks on a plane, as `Simulation`; adding or removing a block starts a new model."""
 
     def __init__(self, mujoco: ModuleType, physics: Physics) -> None:
         self._mujoco, self._physics = mujoco, physics
@@ -112,13 +112,13 @@ class _Simulation:
         return Velocity(_vector(linear), _vector(spin))
 
     def _interrupt(self) -> None:
-        """Let go of the data, as other blocks are to come or go."""
+        """Drop the data before blocks are added or removed."""
         for body in self._bodies.values():
             body.place, body.motion = body.place.copy(), body.motion.copy()
         self._model = self._data = None
 
     def _begin(self) -> None:
-        """Make data with the blocks that are there, unless it is under way."""
+        """Create data with the current blocks, unless they exist."""
         if self._data is not None:
             return
         types = tuple(body.type for body in self._bodies.values())
@@ -137,7 +137,7 @@ def _vector(values: Floats) -> tuple[float, float, float]:
 
 @functools.lru_cache(maxsize=_KEPT)
 def _model(types: tuple[BlockType, ...], physics: Physics) -> Any:
-    """A model of blocks of these types on a floor; their poses are no part of it."""
+    """A model of blocks of these types on a floor, without their poses."""
     mujoco = _loaded()
     spec = mujoco.MjSpec()
     option = spec.option
@@ -146,7 +146,7 @@ def _model(types: tuple[BlockType, ...], physics: Physics) -> Any:
     option.iterations = physics.iterations
     option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
     option.impratio = _FRICTION_STIFFNESS
-    # MuJoCo would put everything back to where it began, and go on.
+    # MuJoCo would otherwise reset everything to its start and continue.
     option.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
     surface = {
         "friction": [physics.friction, 0.0, 0.0],

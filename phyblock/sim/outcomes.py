@@ -1,8 +1,8 @@
-"""Outcomes of taking a block away or putting one down: settled poses, and who moved.
+"""Outcomes of removing or adding a block: settled poses, and the blocks that moved.
 
-An outcome counts only where every setting names the same blocks: each either stayed where it was or
-moved far. Time step, solver, friction and masses vary, and the floor leans a little, each time to
-another side, because a block whose weight is exactly over an edge stays on many a table.
+An outcome counts only if all settings agree and each block either stayed where it was or moved far.
+Time step, solver, friction and masses vary, and the floor is tilted slightly, each time to another
+side, because a block whose weight is exactly over an edge may stay on a level floor.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from phyblock.sim.dynamics import groups, moments, wait
 from phyblock.sim.engine import GRAVITY_M_S2, Physics, Pose, World
 
 LEAN_DEG = 2.0
-"""Slope of the floor [degrees]; blocks begin to slide at 15, where friction is least."""
+"""Slope of the floor [degrees]; at the least friction, blocks begin to slide at 15."""
 _STILL_M, _STILL_DEG = 0.004, 4.0
 _MOVED_M, _MOVED_DEG = 0.02, 20.0
 _LONGEST_S = 5.0
 
 
 def _leaning(physics: Physics, downhill: tuple[float, float]) -> Physics:
-    """The same settings on a floor that leans by `LEAN_DEG` to a side, a unit vector (x, y)."""
+    """The same settings on a floor that is tilted by `LEAN_DEG` towards a unit vector (x, y)."""
     slope = math.radians(LEAN_DEG)
     x, y = (part * math.sin(slope) * GRAVITY_M_S2 for part in downhill)
     return replace(physics, gravity_m_s2=(x, y, -math.cos(slope) * GRAVITY_M_S2))
@@ -42,14 +42,14 @@ OUTCOME_SETTINGS: tuple[Physics, ...] = (
     _leaning(Physics(1 / 300, 80, FRICTIONS[0], mass_factors=_LIGHTER), (_ACROSS, -0.5)),
     _leaning(Physics(1 / 480, 100, 0.35), (-_ACROSS, -0.5)),
 )
-"""Settings that every outcome is tried under; the first gives the settled poses."""
+"""Settings of every outcome; the first gives the settled poses."""
 
 
 @dataclass(frozen=True)
 class Outcome:
     """Result of a removal: orders that moved, and final poses under the first setting.
 
-    Where settings do not agree, with a margin, it is not clear, and the rest means nothing.
+    If settings do not agree with a margin, it is not clear, and the other fields are meaningless.
     """
 
     moved: tuple[int, ...]
@@ -58,7 +58,7 @@ class Outcome:
 
 
 def after_removal(blocks: Sequence[Block], order: int) -> Outcome:
-    """The outcome of taking the block with this order away at once."""
+    """The outcome of suddenly removing the block with this order."""
     left = [block for block in blocks if block.order != order]
     agreed: dict[int, bool | None] = {}
     first: dict[int, Pose] = {}
@@ -75,7 +75,7 @@ def after_removal(blocks: Sequence[Block], order: int) -> Outcome:
 
 
 def holds(blocks: Sequence[Block], about: int) -> bool | None:
-    """True if all blocks near one stay where they are; None where settings, or limits, differ."""
+    """True if all blocks near one stay where they are; None if settings, or limits, differ."""
     near = next(group for group in groups(blocks) if any(b.order == about for b in group))
     verdicts = set()
     for setting in OUTCOME_SETTINGS:
@@ -102,7 +102,7 @@ def _moved(blocks: Sequence[Block], poses: Mapping[int, Pose]) -> dict[int, bool
 
 
 def has_moved(start: Pose, end: Pose) -> bool | None:
-    """True if a block moved far, False if it stayed where it was, None where neither is clear."""
+    """True if a block moved far, False if it stayed where it was, None if neither is clear."""
     distance_m, angle_deg = end.distance_m(start), end.angle_deg(start)
     if distance_m > _MOVED_M or angle_deg > _MOVED_DEG:
         return True

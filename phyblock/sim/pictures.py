@@ -1,8 +1,8 @@
 """The pictures a model sees: goal, numbered candidates, composite; and the keys they cache under.
 
 Pictures are drawn at twice the size and scaled down, so the rasterizer needs no anti-aliasing.
-Outlines run where one face ends, which it tells by number. The same input gives the same bytes in
-every process of one machine; keys name everything that the bytes depend on, and nothing else.
+Outlines are drawn where the face number of pixels changes. The same input gives the same bytes in
+every process of one machine; keys cover everything that the bytes depend on, and nothing else.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from phyblock.text import hex_digest
 from phyblock.types import BACKGROUNDS, Background, View
 
 RENDER_VERSION = 2
-"""Raised whenever the same input gives other pixels, so that stored pictures are made again."""
+"""Increased whenever the same input gives other pixels, so that stored pictures are redrawn."""
 SUPERSAMPLE = 2
 COLOR_RGB: dict[Color, Rgb] = {
     "red": (244, 54, 54),
@@ -51,19 +51,19 @@ Pixel = TypeVar("Pixel", np.uint8, np.float32)
 
 
 def drawn_m(block: Block) -> NDArray[np.float64]:
-    """World corners of what is drawn of a block, shape (n, 3) [m]."""
+    """World corners of the drawn mesh of a block, shape (n, 3) [m]."""
     return _turned_m(block.type, block.euler_deg) + block.position_m
 
 
 @functools.lru_cache(maxsize=1024)
 def _turned_m(block_type: BlockType, euler_deg: Euler) -> NDArray[np.float64]:
-    """World corners of what is drawn of a block at the origin, shape (n, 3) [m]; do not change."""
+    """World corners of a block's drawn mesh at the origin, shape (n, 3) [m]; do not change it."""
     matrix = rounded(euler_deg_to_matrix(euler_deg))
     return turned(drawn_mesh(block_type).vertices_m, matrix)
 
 
 def looks(blocks: Iterable[Block]) -> list[tuple[object, ...]]:
-    """All of blocks that pictures of them depend on."""
+    """Everything about blocks that pictures of them depend on."""
     return [(b.type, b.color, b.position_m, b.euler_deg) for b in blocks]
 
 
@@ -80,7 +80,7 @@ def picture(
     size_px: int,
     ground: NDArray[np.float32] | None = None,
 ) -> Image.Image:
-    """Blocks on their floor, or on a `ground` as `empty_ground` gives it, anti-aliased, RGB."""
+    """Blocks on their floor, or on a `ground` from `empty_ground`, anti-aliased, RGB."""
     image = empty_ground(background, camera, size_px) if ground is None else ground.copy()
     if blocks:
         raster = _raster(blocks, camera, size_px * SUPERSAMPLE)
@@ -105,13 +105,13 @@ class Shot:
 
 
 def shoot(blocks: Sequence[Block], camera: Camera, size_px: int) -> Shot:
-    """Draw blocks alone, with no floor, at exactly `size_px` and unsmoothed."""
+    """Draw blocks without a floor, at exactly `size_px` and without anti-aliasing."""
     raster = _raster(blocks, camera, size_px)
     return Shot(draw_outlines(raster.rgb, raster, None), raster.prop)
 
 
 def segments(blocks: Sequence[Block], camera: Camera, size_px: int) -> NDArray[np.int64]:
-    """The 0-based number of the block seen in each pixel, shape (size, size), -1 for none."""
+    """The 0-based number of the block in each pixel, shape (size, size), -1 for none."""
     light = Light(np.array([0.0, 0.0, 1.0]), 1.0, 0.0)
     return draw(props_of(blocks), camera, light, size_px).prop
 
@@ -122,12 +122,12 @@ def _raster(blocks: Sequence[Block], camera: Camera, size_px: int) -> Raster:
 
 
 def props_of(blocks: Sequence[Block]) -> list[Prop]:
-    """Blocks as the rasterizer takes them."""
+    """Blocks as props of the rasterizer."""
     return [Prop(drawn_mesh(b.type), COLOR_RGB[b.color], Pose.goal(b)) for b in blocks]
 
 
 def light_direction(camera: Camera) -> NDArray[np.float64]:
-    """Unit vector to the light, which goes round with the camera: above, a little to its left."""
+    """Unit vector to the light, which moves with the camera: above, slightly to its left."""
     right = camera.axes[0]
     azimuth = math.atan2(-right[0], right[1]) + math.radians(_LIGHT_AZIMUTH_DEG)
     elevation = math.radians(_LIGHT_ELEVATION_DEG)
@@ -149,7 +149,7 @@ def draw_outlines(
 
 
 def _ends(*numbers: NDArray[np.int64] | NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """The pixels beside which some number (size, size) changes, to the sides, above or below."""
+    """The pixels beside which some number (size, size) changes, horizontally or vertically."""
     across = np.logical_or.reduce([number[:, 1:] != number[:, :-1] for number in numbers])
     down = np.logical_or.reduce([number[1:] != number[:-1] for number in numbers])
     ends = np.zeros(numbers[0].shape, dtype=np.bool_)
@@ -160,9 +160,9 @@ def _ends(*numbers: NDArray[np.int64] | NDArray[np.bool_]) -> NDArray[np.bool_]:
     return ends
 
 
-SMALLEST_PX, LARGEST_PX = 128, 2048  # Sides that pictures may have.
+SMALLEST_PX, LARGEST_PX = 128, 2048  # Allowed sides of pictures.
 GRID_COLUMNS = 4
-LABEL_STRIP = 0.23  # Share of a cell's height, at its foot, that is kept free for the number.
+LABEL_STRIP = 0.23  # Share of a cell's height, at its bottom, that is kept free for the number.
 _LABEL_SIZE = 0.17
 _LABEL_MARGIN = 0.05
 _RIM = 0.012
@@ -174,7 +174,7 @@ _LARGEST_DIAGONAL_M = 0.16
 _SIZE_CUE = 0.25
 _CUBE_M = 0.05
 _LEAST_CUBE = 0.08
-"""The least share of a goal picture's side that the edge of its farthest cube takes."""
+"""The least edge of a cube at the farthest block, as a share of the goal picture's side."""
 
 
 @dataclass(frozen=True)
@@ -182,7 +182,7 @@ class PictureStyle:
     """Side length [pixels], background, and direction of the camera.
 
     Azimuth 0 looks from +x and 90 from +y; elevation 90 looks straight down [degrees]. Raises
-    ValueError for what is not allowed.
+    ValueError for values that are not allowed.
     """
 
     size_px: int = 512
@@ -222,7 +222,7 @@ def goal_png(scene: Scene, style: PictureStyle) -> bytes:
 
 
 def candidates_png(candidates: CandidateSet, style: PictureStyle) -> bytes:
-    """PNG of the numbered candidates, square, 4 by 4 cells, seen from where the goal is seen."""
+    """PNG of the numbered candidates, square, 4 by 4 cells, in the goal's view."""
     grid, _, _ = candidates_grid(candidates, style)
     return to_png(grid)
 
@@ -248,25 +248,25 @@ def gap_px(height_px: int) -> int:
 
 
 def to_png(image: Image.Image) -> bytes:
-    """The image as PNG; the same pixels always give the same bytes (no time, no metadata)."""
+    """The image as PNG; the same pixels always give the same bytes (no time or metadata)."""
     buffer = io.BytesIO()
     image.save(buffer, format="PNG", optimize=False, compress_level=6)
     return buffer.getvalue()
 
 
 def goal_key(scene: Scene, style: PictureStyle) -> str:
-    """SHA-256 [hex] of all that the goal picture depends on; the scene's id is not part of it."""
+    """SHA-256 [hex] of everything that the goal picture depends on, without the scene's id."""
     return picture_key("goal", style, looks(scene.blocks))
 
 
 def candidates_key(candidates: CandidateSet, style: PictureStyle) -> str:
-    """SHA-256 [hex] of all that the candidate grid depends on."""
+    """SHA-256 [hex] of everything that the candidate grid depends on."""
     content = [(c.type, c.color, c.euler_deg) for c in candidates.candidates]
     return picture_key("candidates", style, ["common", *content])
 
 
 def picture_key(kind: str, style: PictureStyle, content: Iterable[object]) -> str:
-    """SHA-256 [hex] of a picture's content, its style, and the versions of what draws it."""
+    """SHA-256 [hex] of a picture's content, its style, and the versions of the drawing code."""
     parts = {
         "kind": kind,
         "render_version": RENDER_VERSION,
@@ -278,17 +278,17 @@ def picture_key(kind: str, style: PictureStyle, content: Iterable[object]) -> st
 
 
 def pixel_versions() -> dict[str, str]:
-    """Versions of what draws: the rasterizer, and Pillow for text, lines, scaling and PNG."""
+    """Versions of the rasterizer, and of Pillow for text, lines, scaling and PNG."""
     return {"raster": RASTER_VERSION, "pillow": PIL.__version__}
 
 
 def goal_camera(scene: Scene, style: PictureStyle) -> Camera:
-    """The camera of the goal picture; raises DataError for a scene without blocks."""
+    """The camera of the goal picture. Raises DataError for a scene without blocks."""
     return camera_for(scene.blocks, style, scene.id)
 
 
 def goal_style(scene: Scene, style: PictureStyle) -> PictureStyle:
-    """The style, of a larger size where the farthest block of a goal would come out small."""
+    """The style, with a larger size if the farthest block of a goal would be small."""
     camera = goal_camera(scene, style)
     places = np.array([block.position_m for block in scene.blocks])
     farthest_m = float(dot(places - camera.eye_m, camera.axes[2]).max())
@@ -300,7 +300,7 @@ def goal_style(scene: Scene, style: PictureStyle) -> PictureStyle:
 def camera_for(
     blocks: Sequence[Block], style: PictureStyle, where: str, shown: Sequence[Block] = ()
 ) -> Camera:
-    """The camera that frames blocks, of all that are shown; DataError, at `where`, of none."""
+    """The camera that frames blocks among all `shown` ones. Raises DataError without blocks."""
     if not blocks:
         raise DataError(Problem(where=where, field="blocks", message="there is none to draw"))
     points, more = (np.vstack([drawn_m(b) for b in some]) for some in (blocks, shown or blocks))
@@ -308,7 +308,7 @@ def camera_for(
 
 
 class Lookout:
-    """The camera of a scene's goal, from which other blocks are drawn quickly."""
+    """The camera of a scene's goal, prepared to draw other blocks quickly."""
 
     def __init__(self, scene: Scene, style: PictureStyle) -> None:
         self._goal, self._style, camera = scene.blocks, style, goal_camera(scene, style)
@@ -319,7 +319,7 @@ class Lookout:
         """The blocks on the ground, an RGB image of the style's size."""
         style = self._style
         camera = camera_for(self._goal, style, "current", blocks)
-        # Blocks that fell towards the camera may have pushed it back.
+        # Blocks that fell towards the camera may require it to move back.
         ground = self._ground if np.array_equal(camera.eye_m, self._eye_m) else None
         return picture(blocks, camera, style.background, style.size_px, ground)
 
@@ -327,7 +327,7 @@ class Lookout:
 def candidates_grid(
     candidates: CandidateSet, style: PictureStyle
 ) -> tuple[Image.Image, list[Block], float | None]:
-    """Candidates in a 4 by 4 grid, numbered from 1, as drawn, and their common distance [m]."""
+    """Candidates in a numbered 4 by 4 grid, the drawn blocks, and their common distance [m]."""
     size_px, cell_px = style.size_px, math.ceil(style.size_px / GRID_COLUMNS)
     blocks = [on_the_floor(c.type, c.color, c.euler_deg) for c in candidates.candidates]
     distance_m = common_distance_m(blocks, style)
@@ -351,7 +351,7 @@ def candidates_grid(
 
 
 def _write_number(cell: Image.Image, number: int, background: Background) -> None:
-    """The number at the foot of the cell; on a floor with a grain, with a rim around it."""
+    """Write the number at the bottom of the cell; on textured floors, with a rim around it."""
     side = cell.height
     font = ImageFont.load_default(size=_LABEL_SIZE * side)
     place = (side * (1 - _LABEL_MARGIN), side * (1 - _LABEL_MARGIN))
@@ -366,13 +366,13 @@ def _write_number(cell: Image.Image, number: int, background: Background) -> Non
 def thumbnail(
     block: Block, style: PictureStyle, cell_px: int, distance_m: float | None
 ) -> Image.Image:
-    """One cell of the grid of candidates, before its number; shared: do not draw on it."""
+    """One cell of the candidate grid, without its number; shared: do not draw on it."""
     camera = candidate_camera(block, style, distance_m)
     return picture([block], camera, style.background, cell_px)
 
 
 def candidate_camera(block: Block, style: PictureStyle, distance_m: float | None = None) -> Camera:
-    """The camera of one cell, so far from the middle of the block [m], or filled by it."""
+    """The camera of one cell, at a distance from the block's center [m], or filled by it."""
     if distance_m is None:
         return close_camera(block, style, _CELL_WINDOW)
     nearest_m = distance_m - _half_depth_m(block, style)
@@ -380,14 +380,14 @@ def candidate_camera(block: Block, style: PictureStyle, distance_m: float | None
 
 
 def close_camera(block: Block, style: PictureStyle, window: Window) -> Camera:
-    """The camera of a block by itself, which fills a like share whatever its type."""
+    """The camera of a single block, which fills about the same share for every type."""
     shape = SHAPES[block.type]
     share = math.dist(shape.low_m, shape.high_m) / _LARGEST_DIAGONAL_M
     return frame(drawn_m(block), style.axes, window.scaled(share**_SIZE_CUE))
 
 
 def common_distance_m(blocks: Iterable[Block], style: PictureStyle) -> float:
-    """The least distance from the middle of each block [m] from which all fit their cells."""
+    """The least distance from the center of each block [m] at which all fit their cells."""
     axes, needed = style.axes, [0.0]
     for block in blocks:
         closest = frame(drawn_m(block), axes, _CELL_WINDOW)
@@ -401,14 +401,14 @@ def _half_depth_m(block: Block, style: PictureStyle) -> float:
 
 
 LEAST_SHARE = 12 / 256**2
-"""The least share of a goal picture that must show of a block: 48 pixels of 512 by 512."""
+"""The least visible area of a block as a share of a goal picture: 48 pixels of 512 by 512."""
 LEAST_SHOWN = 0.03
-"""The least share of a block's own outline that must show in the goal picture of a scene."""
+"""The least visible share of a block's own outline in the goal picture of a scene."""
 _SEEN_PX = 256
 
 
 def visible_shares(scene: Scene, style: PictureStyle) -> dict[int, float]:
-    """For each block's order, the share that shows of the pixels that it covers alone, 0..1."""
+    """For each block's order, the visible share of the pixels that it covers by itself, 0..1."""
     camera, blocks = goal_camera(scene, style), scene.blocks
     together = segments(blocks, camera, style.size_px)
     shares = {}
@@ -419,7 +419,7 @@ def visible_shares(scene: Scene, style: PictureStyle) -> dict[int, float]:
 
 
 def hidden_blocks(scene: Scene) -> tuple[int, ...]:
-    """Orders of the blocks that show less than `LEAST_SHARE` in the default goal picture."""
+    """Orders of the blocks with less than `LEAST_SHARE` visible in the default goal picture."""
     seen = segments(scene.blocks, goal_camera(scene, PictureStyle()), _SEEN_PX)
     counts = np.bincount(seen[seen >= 0], minlength=len(scene))
     least = LEAST_SHARE * _SEEN_PX**2

@@ -1,8 +1,8 @@
 """PyBullet as a physics engine, loaded when a simulation is opened.
 
-Structures stand as on a table with collision hulls moved inward by the 1 mm margin that Bullet adds
-to meshes, the center of mass and the inertia of the true solid, and the square root of the pair's
-friction on each body, because Bullet multiplies them.
+Structures stand as on a real table with these settings: collision hulls shrunk by the 1 mm margin
+that Bullet adds to meshes, the center of mass and the inertia of the true solid, and the square
+root of the pair's friction on each body, because Bullet multiplies them.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ _MESH_MARGIN_M = 0.001
 
 
 class BulletEngine:
-    """Opens simulations, each in a PyBullet client of its own."""
+    """Opens simulations, each in its own PyBullet client."""
 
     name = "pybullet"
 
     @contextlib.contextmanager
     def open(self, physics: Physics) -> Iterator[_Simulation]:
-        """Open a floor without blocks; SimulationError when too many are open."""
+        """Open a floor without blocks. Raises SimulationError if too many are open."""
         bullet = _loaded()
         client = bullet.connect(bullet.DIRECT)
         if client < 0:
@@ -62,7 +62,7 @@ def _loaded() -> ModuleType:
 
 
 class _Simulation:
-    """Blocks on a plane, as `Simulation`; Bullet itself knows centers of mass only."""
+    """Blocks on a plane, as `Simulation`; Bullet itself uses only centers of mass."""
 
     def __init__(self, bullet: ModuleType, client: int, physics: Physics) -> None:
         self._bullet, self._client, self._physics = bullet, client, physics
@@ -130,7 +130,7 @@ class _Simulation:
         )
 
     def _shape(self, block_type: BlockType) -> int:
-        """Make the collision shape of a type about its center of mass."""
+        """Create the collision shape of a type around its center of mass."""
         if SHAPES[block_type].is_box:
             # Bullet keeps its margin inside a box.
             half_m = list(SHAPES[block_type].high_m)
@@ -138,7 +138,7 @@ class _Simulation:
                 self._bullet.GEOM_BOX, halfExtents=half_m, physicsClientId=self._client
             )
             return int(shape)
-        # PyBullet takes but one hull from memory, and wraps hulls round the corners of a file.
+        # PyBullet accepts only one hull from memory, but several from a file.
         center = np.array(SHAPES[block_type].center_of_mass_m)
         lines: list[str] = []
         first = 1

@@ -1,8 +1,8 @@
-"""The pictures of questions: a recipe to a PNG, its key, its marks, and what can be told from it.
+"""The pictures of questions: from a recipe to a PNG, its key, its marks, and its visible facts.
 
-The same recipe and style give the same bytes, and the key names all that they depend on. A mark is
-a small target on the surface, a line, and a label at its end, which read on every floor. Pictures
-are compared as they are drawn at 256 pixels, before floor and smoothing.
+The same recipe and style give the same bytes, and the key covers everything they depend on. A mark
+is a small target on the surface, a line, and a label at its end, readable on every floor. Pictures
+are compared at 256 pixels, without floor and anti-aliasing.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from phyblock.sim.pictures import (
 from phyblock.text import hex_digest
 
 QUESTION_RENDER_VERSION = 2
-"""Raised whenever the same recipe gives other pixels, so that stored pictures are made again."""
+"""Increased whenever the same recipe gives other pixels, so that stored pictures are redrawn."""
 BLOCK_LABEL = "block"  # The label of a picture that shows one block by itself.
 SEEN_PX = 256  # Side of the pictures that are compared.
 MARKS_APART_PX = 18.0  # Targets are this far apart at the least, in pixels of `SEEN_PX`.
@@ -76,7 +76,7 @@ def question_png(recipe: QuestionPicture, style: PictureStyle) -> bytes:
 
 @functools.lru_cache(maxsize=48)
 def question_camera(recipe: QuestionPicture, style: PictureStyle) -> Camera:
-    """The camera of a question's picture: as a goal's, or of a block by itself as a candidate's."""
+    """The camera of a question's picture: like a goal's, or like a candidate's for one block."""
     azimuth_deg, elevation_deg = recipe.view_deg
     seen_from = replace(style, azimuth_deg=azimuth_deg, elevation_deg=elevation_deg)
     shown = drawn_blocks(recipe)
@@ -86,7 +86,7 @@ def question_camera(recipe: QuestionPicture, style: PictureStyle) -> Camera:
 
 
 def drawn_blocks(recipe: QuestionPicture) -> Sequence[Block]:
-    """The blocks as they are drawn; one shown by itself (label `block`) lies on the floor."""
+    """The blocks as drawn; a single block (label `block`) lies on the floor."""
     if _is_alone(recipe):
         only = recipe.blocks[0]
         return [on_the_floor(only.type, only.color, only.euler_deg)]
@@ -98,13 +98,13 @@ def _is_alone(recipe: QuestionPicture) -> bool:
 
 
 def state_picture(scene: Scene, blocks: Sequence[Block], style: PictureStyle) -> QuestionPicture:
-    """The recipe of a picture of blocks on the ground, seen exactly as the goal picture is."""
+    """The recipe of a picture of blocks on the ground, with the goal picture's camera."""
     view_deg = (style.azimuth_deg, style.elevation_deg)
     return QuestionPicture("current", tuple(blocks), view_deg, framed=scene.blocks)
 
 
 def question_key(recipe: QuestionPicture, style: PictureStyle) -> str:
-    """SHA-256 [hex] of all that the picture depends on, so that equal pictures share a file."""
+    """SHA-256 [hex] of everything the picture depends on, so that equal pictures share a file."""
     parts = {
         "kind": "question",
         "render_version": [RENDER_VERSION, QUESTION_RENDER_VERSION],
@@ -162,7 +162,7 @@ def _with_marks(image: Image.Image, marks: Sequence[Mark], camera: Camera) -> Im
 
 
 def _label_places(centers: Sequence[Point], radius: float, size_px: int) -> list[Point]:
-    """The labels' centers: each in turn at its best place, until none moves."""
+    """The centers of labels: each is moved to its best place in turn, until none moves."""
 
     def beside(center: Point, angle_deg: float, distance: float) -> Point:
         angle, far = math.radians(angle_deg), distance * radius
@@ -178,7 +178,7 @@ def _label_places(centers: Sequence[Point], radius: float, size_px: int) -> list
             for far, index in product(range(len(_DISTANCES)), range(len(_ANGLES_DEG))):
                 place = beside(center, _ANGLES_DEG[index], _DISTANCES[far])
                 cost = _cost(center, place, labels, targets, radius, size_px)
-                # It costs to be far from the target, or not above it.
+                # Distance from the target costs, and so does a place that is not above it.
                 options.append((cost + (10 * far + index), place))
             chosen[number] = min(options)[1]
         if chosen == before:
@@ -194,7 +194,7 @@ def _cost(
     radius: float,
     size_px: int,
 ) -> float:
-    """Cost of a label's place over an edge, a label or a target, or with a line over either."""
+    """Cost of a label's place on an edge, a label or a target, or of its line on one."""
 
     def from_line(point: Point) -> float:
         """Distance from the line between target and label."""
@@ -217,7 +217,7 @@ def _cost(
 
 
 class Top(NamedTuple):
-    """A point of a surface [m], the z of its unit normal, its way from the block's middle [m]."""
+    """A point of a surface [m], the z of its unit normal, and its offset from the center [m]."""
 
     position_m: tuple[float, float, float]
     rise: float
@@ -226,7 +226,7 @@ class Top(NamedTuple):
 
 @functools.lru_cache(maxsize=48)
 def seen(recipe: QuestionPicture) -> Shot:
-    """The blocks of a picture by its camera, `SEEN_PX` squared, with no floor and no marks."""
+    """The blocks of a picture from its camera, `SEEN_PX` squared, without floor and marks."""
     return shoot(drawn_blocks(recipe), question_camera(recipe, _STYLE), SEEN_PX)
 
 
@@ -238,14 +238,14 @@ def changed_pixels(one: Shot, other: Shot) -> NDArray[np.bool_]:
 
 @functools.lru_cache(maxsize=48)
 def _colors(shot: Shot) -> NDArray[np.int16]:
-    """Colors with every pixel of the floor white."""
+    """Colors, with white floor pixels."""
     colors = shot.rgb.astype(np.int16)
     colors[shot.block < 0] = 255
     return colors
 
 
 def least_difference(shots: Sequence[Shot]) -> int:
-    """The fewest pixels in which any two pictures differ; two at least must be given."""
+    """The least number of pixels in which any two of at least two pictures differ."""
     return min(int(changed_pixels(*pair).sum()) for pair in combinations(shots, 2))
 
 
@@ -268,9 +268,9 @@ def is_inside(recipe: QuestionPicture) -> bool:
 
 
 def block_mark(recipe: QuestionPicture, shot: Shot, order: int, letter: str) -> Mark | None:
-    """A mark in the middle of what shows of a block; None where too little shows."""
+    """A mark at the center of the visible part of a block; None if too little is visible."""
     vertex = next(i for i, block in enumerate(recipe.blocks) if block.order == order)
-    # The pixels that last longest as the mask is eaten from its edge.
+    # The pixels that remain longest as the mask is eroded.
     depth, last, left = 0, shot.block == vertex, shot.block == vertex
     while left.any():
         depth, last = depth + 1, left
@@ -286,7 +286,7 @@ def block_mark(recipe: QuestionPicture, shot: Shot, order: int, letter: str) -> 
 
 
 def visible_tops(recipe: QuestionPicture, shot: Shot, step_px: int, least_rise: float) -> list[Top]:
-    """Points of surfaces behind every `step_px`-th pixel, `rise` at least so much."""
+    """Points of surfaces at every `step_px`-th pixel with at least `least_rise`."""
     camera, blocks = question_camera(recipe, _STYLE), drawn_blocks(recipe)
     tops = []
     for row, column in product(range(step_px // 2, SEEN_PX - 2, step_px), repeat=2):
@@ -308,7 +308,7 @@ def mark_pixel(recipe: QuestionPicture, position_m: tuple[float, float, float]) 
 def seen_order(
     recipe: QuestionPicture, shot: Shot, position_m: tuple[float, float, float]
 ) -> int | None:
-    """Order of the block that shows at a point of the world; None for the floor."""
+    """Order of the block that is visible at a point of the world; None for the floor."""
     vertex = int(shot.block[mark_pixel(recipe, position_m)])
     return recipe.blocks[vertex].order if vertex >= 0 else None
 
@@ -316,7 +316,7 @@ def seen_order(
 def is_apart(
     recipe: QuestionPicture, mark: Mark, others: Sequence[Mark], least_px: float = MARKS_APART_PX
 ) -> bool:
-    """True if a mark's target is so many pixels of `SEEN_PX` away from all the others'."""
+    """True if a mark's target is `least_px` pixels of `SEEN_PX` away from all others."""
     places = np.array([one.position_m for one in (mark, *others)])
     pixels = question_camera(recipe, _STYLE).to_pixels(places, SEEN_PX)
     apart = np.linalg.norm(pixels[1:] - pixels[0], axis=1)

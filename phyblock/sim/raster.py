@@ -1,8 +1,8 @@
 """The rasterizer: triangles to pixels in numpy, with shadows, the same bytes on every machine.
 
 All triangles are scanned at once: each row of pixels that a triangle crosses is a span. The nearest
-triangle of each pixel is kept by its nearness, a number that is linear over the screen (the inverse
-of depth for a camera; the height towards a light from far away).
+triangle of each pixel is found by its nearness, a number that is linear over the screen (the
+inverse of depth for a camera; the height towards a distant light).
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from phyblock.sim.camera import Camera
 from phyblock.sim.engine import Pose
 from phyblock.sim.geometry import Mesh, cross, dot, rounded, turned, unit
 
-RASTER_VERSION = "1"  # Raised whenever the same props give other pixels.
-NOTHING = -1  # Stands for the triangle of a pixel that shows none.
+RASTER_VERSION = "1"  # Increased whenever the same props give other pixels.
+NOTHING = -1  # The triangle of a pixel that shows none.
 
 Rgb = tuple[int, int, int]  # Red, green and blue, 0..255.
 Floats = NDArray[np.float64]
@@ -28,16 +28,16 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
 _AT_ONCE = 1 << 16
-"""Pixels that are worked on together: what they take of memory is used again and again."""
-_FLAT = 1e-9  # Unit normals that differ by less in each component are those of one plane.
+"""Pixels that are processed together, so that their memory is reused."""
+_FLAT = 1e-9  # Unit normals that differ by less in each component belong to one plane.
 _LEAST_DEPTH_M = 1e-3
-"""Faces nearer to a camera are not drawn, as one cannot project what is behind it."""
+"""Faces nearer to a camera are not drawn, since points behind it cannot be projected."""
 _LIGHT_SCREEN = 0.75
-"""Side of the light's picture, as a share of the camera's: props fill the former wholly."""
+"""Side of the light's picture, as a share of the camera's; props fill all of it."""
 _MARGIN_PX = 2
 _AWAY = -1e-6
 _TOUCHING_M = 5e-5
-"""A point this little behind a face is at it: blocks at rest overlap by less [m]."""
+"""A point this close behind a face is on it: blocks at rest overlap by less [m]."""
 _TAPS = ((0, 0), (1, 0), (0, 1), (1, 1))
 
 
@@ -52,7 +52,7 @@ class Prop:
 
 @dataclass(frozen=True, eq=False)
 class Light:
-    """A light from far away: `direction` (3,) is the unit vector to it, in the world.
+    """A distant light: `direction` (3,) is the unit vector to it, in the world.
 
     A face in the light has its color times ambient + diffuse * max(0, normal . direction).
     """
@@ -66,8 +66,8 @@ class Light:
 class Raster:
     """A drawing: `rgb` shape (size, size, 3), 0..255, row 0 on top; the others (size, size).
 
-    `prop` is the place in the list of the prop that each pixel shows, or -1; `face` tells the faces
-    of a prop apart; `shaded` is where the ground lies in shadow, whatever stands before it.
+    `prop` is the index of the prop in each pixel, or -1; `face` is the number of its face; `shaded`
+    is true where the ground is in shadow, even behind props.
     """
 
     rgb: NDArray[np.uint8]
@@ -77,7 +77,7 @@ class Raster:
 
 
 def draw(props: Sequence[Prop], camera: Camera, light: Light, size_px: int) -> Raster:
-    """Draw closed meshes between the camera's near and far plane, `size_px` squared."""
+    """Draw closed meshes between the camera's near and far planes, `size_px` squared."""
     screen = _CameraScreen(camera, size_px)
     rgb = np.zeros((size_px, size_px, 3), dtype=np.uint8)
     if not props:
@@ -126,7 +126,7 @@ class _Solids:
 
 
 def _solids(props: Sequence[Prop]) -> _Solids:
-    """The triangles of some props, one at least."""
+    """The triangles of at least one prop."""
 
     def name(place: int) -> tuple[object, ...]:
         prop = props[place]
@@ -160,7 +160,7 @@ class _CameraScreen:
 
     @property
     def most(self) -> float:
-        """Nearness of the near plane, or of what is as near as can be drawn."""
+        """Nearness of the near plane, or of the nearest depth that can be drawn."""
         return 1 / max(self.camera.near_m, _LEAST_DEPTH_M)
 
     def linear(self, vectors: Floats) -> Floats:
@@ -221,7 +221,7 @@ def _spans(corners_px: Floats, size_px: int) -> _Spans:
         """The first pixel whose center is not before a place, within the screen."""
         return np.ceil(np.clip(place, 0.0, size_px) - 0.5).astype(np.int64)
 
-    # Crossings come from an edge's ends alone, in one order: no pixel along it is in both or none.
+    # Crossings depend only on an edge's ends, in one order: each pixel is in exactly one triangle.
     order = np.argsort(corners_px[..., 1], axis=1, kind="stable")
     x, y = np.moveaxis(np.take_along_axis(corners_px, order[..., None], axis=1), -1, 0)
     first, end = (from_center(y[:, i]) for i in (0, 2))
@@ -231,7 +231,7 @@ def _spans(corners_px: Floats, size_px: int) -> _Spans:
     x, y, center = x[triangle], y[triangle], row + 0.5
 
     def crossing(start: int, end: int) -> Floats:
-        """Crossing of the edge between two corners with a row's center; any for a level edge."""
+        """Crossing of the edge between two corners with a row's center; arbitrary if level."""
         rise = y[:, end] - y[:, start]
         slope = (x[:, end] - x[:, start]) / np.where(rise > 0, rise, 1.0)
         return x[:, start] + (center - y[:, start]) * slope
@@ -269,7 +269,7 @@ def _nearest(
 
 
 class _Points(NamedTuple):
-    """Points that pixels show, each (n,): their column and row, and the depth [m]."""
+    """Visible points of pixels, each (n,): their column and row, and the depth [m]."""
 
     column: Floats
     row: Floats
@@ -287,14 +287,14 @@ class _Points(NamedTuple):
 
 
 class _Look:
-    """Colors of the triangles in `front` of a camera, in a light that all of `solid` shades."""
+    """Colors of the triangles in `front` of a camera, in a light that `solid` shades."""
 
     def __init__(
         self, rgb: Floats, solid: _Solids, front: _Solids, screen: _CameraScreen, light: Light
     ) -> None:
         self._rgb = rgb[front.prop]
         self._light, self._map = light, None
-        # The cosine to the light is known at corners, and linear between them.
+        # The cosine to the light is computed at corners, and interpolated between them.
         cosines = dot(front.bends, light.direction)
         gradient = _gradient(front.corners_m, cosines)
         self._is_bent = np.ptp(cosines, axis=1) > 0
@@ -309,7 +309,7 @@ class _Look:
             self._map_places = list(zip(eye, steps, strict=True))
 
     def colors(self, shown: NDArray[np.int32], points: _Points) -> Floats:
-        """Color of each point by the triangle that it is of, shape (n, 3), 0..255, whole."""
+        """Color of each point by its triangle, shape (n, 3), 0..255, whole numbers."""
         bright = self._cosine[shown]
         bent = np.flatnonzero(self._is_bent[shown])
         which = shown[bent]
@@ -341,9 +341,9 @@ def _gradient(corners_m: Floats, values: Floats) -> Floats:
 class _LightMap:
     """The picture from the light, `size_px` squared: shadows of props on props.
 
-    It shows the face nearest to the light of those that look away from it: a point is in shadow
-    behind that face's plane. Faces that look to the light never shade themselves this way, so that
-    no bias is needed (second-depth shadow mapping: Wang and Molnar 1994). Nearness is the height
+    It stores the face nearest to the light among those that face away from it: a point behind that
+    face's plane is in shadow. So faces towards the light never shade themselves, and no bias is
+    needed (second-depth shadow mapping: Wang and Molnar 1994). Nearness is the height
     towards the light [m]; `axes` are right, up, towards the light (world).
     """
 
@@ -364,7 +364,7 @@ class _LightMap:
         alike[:-1, :-1] = shown[:-1, :-1] == shown[1:, 1:]
         alike[:-1, :-1] &= (shown[:-1, :-1] == shown[:-1, 1:]) & (shown[:-1, :-1] == shown[1:, :-1])
         self._shown, self._alike = shown.ravel(), alike.ravel()
-        # Where nothing is seen, nothing shades.
+        # Empty pixels cast no shadow.
         self._planes = np.vstack([planes, [0.0, 0.0, -np.inf]]).T.copy()
 
     def _planes_of(self, triangles: _Solids) -> Floats:
@@ -383,11 +383,11 @@ class _LightMap:
 
     @property
     def steps(self) -> Floats:
-        """Change of `places` for a way of 1 m along x, y and z: rows column, row, height."""
+        """Change of `places` per 1 m along x, y and z: rows column, row, height."""
         return self._axes / np.array([[self._pixel_m], [self._pixel_m], [1.0]])
 
     def lit(self, column: Floats, row: Floats, height: Floats) -> Floats:
-        """The share of the light that points of a surface get, 0..1, by their places."""
+        """The share of light on points of a surface, 0..1, by their places."""
         column, row = column - 0.5, row - 0.5
         left, top = np.floor(column), np.floor(row)
         pixel = (top * self._size_px + left).astype(np.int64)
@@ -404,14 +404,14 @@ class _LightMap:
         return lit
 
     def _is_before(self, pixel: Ints, column: Floats, row: Floats, height: Floats) -> Bools:
-        """True for points on the light's side of the face that each pixel shows."""
+        """True for points on the light's side of the face in their pixel."""
         a, b, c = self._planes
         shown = self._shown[pixel]
         return height + _TOUCHING_M > a[shown] * column + (b[shown] * row + c[shown])
 
 
 def _ground_shadow(solid: _Solids, direction: Floats, screen: _CameraScreen) -> Bools:
-    """The pixels whose ground z = 0 lies in shadow, whatever stands before it, (size, size)."""
+    """The pixels whose ground z = 0 is in shadow, even behind props, (size, size)."""
     size_px = screen.size_px
     inside = np.zeros((size_px, size_px), dtype=np.bool_)
     if direction[2] <= 0:
@@ -424,7 +424,7 @@ def _ground_shadow(solid: _Solids, direction: Floats, screen: _CameraScreen) -> 
         n, start = (end - first) * (size_px + 1), (covering.row - first) * (size_px + 1)
         depth = np.bincount(start + covering.left, minlength=n)
         depth -= np.bincount(start + covering.right, minlength=n)
-        # A row's spans end within it, so that one sum runs through all rows.
+        # A row's spans end within it, so that one cumulative sum covers all rows.
         np.cumsum(depth, out=depth)
         inside[first:end] = depth.reshape(-1, size_px + 1)[:, :-1] > 0
     return inside

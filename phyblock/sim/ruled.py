@@ -1,7 +1,7 @@
-"""Pictures with measures: the goal on a ruled floor, and the kit sheet of all candidates.
+"""Pictures with scales: the goal on a ruled floor, and the sheet of all candidates.
 
 The floor has lines every centimeter, numbers every five along the two edges next to the camera, and
-axes with names. A pole at the far corner rules the height.
+named axes. A pole at the far corner marks the height.
 """
 
 from __future__ import annotations
@@ -36,9 +36,9 @@ from phyblock.sim.pictures import (
 from phyblock.sim.raster import Rgb
 
 RULED_VERSION = 1
-"""Raised whenever the rules come out otherwise, so that stored pictures are made again."""
+"""Increased whenever the scales change, so that stored pictures are redrawn."""
 KIT_VERSION = 1
-"""Raised whenever the sheet comes out otherwise, so that stored pictures are made again."""
+"""Increased whenever the sheet changes, so that stored pictures are redrawn."""
 
 _CM = 100.0
 _MARGIN_CM = 3.0
@@ -59,18 +59,18 @@ Point = tuple[float, float, float]
 
 
 def ruled_png(scene: Scene, style: PictureStyle) -> bytes:
-    """PNG of the goal on a ruled floor, seen as the style says; the scene must have a block."""
+    """PNG of the goal on a ruled floor, in the view of the style; the scene must have a block."""
     return to_png(RuledFloor(scene, style).image(scene.blocks))
 
 
 def ruled_key(scene: Scene, style: PictureStyle) -> str:
-    """SHA-256 [hex] of all that the picture depends on."""
+    """SHA-256 [hex] of everything that the picture depends on."""
     content = [RULED_VERSION, *looks(scene.blocks)]
     return picture_key("ruled goal", style, content)
 
 
 class RuledFloor:
-    """The ruled floor of a scene, which must have a block: draws blocks seen as its goal is."""
+    """The ruled floor of a scene, which must have a block; draws blocks from the goal's camera."""
 
     def __init__(self, scene: Scene, style: PictureStyle) -> None:
         field = _field(scene.blocks, style)
@@ -118,7 +118,7 @@ def _field(blocks: Sequence[Block], style: PictureStyle) -> _Field:
     first = [math.floor((side - _MARGIN_CM) / _MAJOR_CM) * _MAJOR_CM for side in low]
     last = [math.ceil((side + _MARGIN_CM) / _MAJOR_CM) * _MAJOR_CM for side in high]
     azimuth = math.radians(style.azimuth_deg)
-    # The camera is on the side of +x at azimuth 0; beside an axis, either of its ends will do.
+    # The camera is on the side of +x at azimuth 0; beside an axis, either end is suitable.
     x, y = ((first[axis], last[axis]) for axis in (0, 1))
     near_x, near_y = math.cos(azimuth) > -1e-6, math.sin(azimuth) > -1e-6
     top = math.ceil((high[2] + 1) / _MAJOR_CM) * _MAJOR_CM
@@ -144,7 +144,7 @@ class _Pen:
         self._draw = ImageDraw.Draw(image)
 
     def along(self, place: Point, by: float) -> Point:
-        """The place that lies so far to the right of another in the picture, at its height."""
+        """The place at a distance to the right of another in the picture, at the same height."""
         right_x, right_y, _ = self._camera.axes[0].tolist()
         return (place[0] + right_x * by, place[1] + right_y * by, place[2])
 
@@ -158,7 +158,7 @@ class _Pen:
         self._draw.line([self.pixel(start), self.pixel(end)], fill=ink, width=width)
 
     def text(self, place: Point, text: str, ink: Rgb, size_cm: float) -> None:
-        """A text about so high, not less than can be read, with its middle at a place."""
+        """Draw a text of about this height, but readable, with its center at a place."""
         per_cm = math.dist(self.pixel(place), self.pixel(self.along(place, 1)))
         size = min(max(size_cm * per_cm, 0.024 * self._size_px), 0.05 * self._size_px)
         font = ImageFont.load_default(size=round(size, 2))
@@ -169,7 +169,7 @@ class _Pen:
 
 
 def _write(pen: _Pen, field: _Field, ink: Rgb, *, has_pole: bool) -> None:
-    """Axes through the origin, names and numbers, and the pole."""
+    """Draw axes through the origin, names and numbers, and the pole."""
     x_ink, y_ink, z_ink = _DARK if sum(ink) < _LIGHT_SUM else _BRIGHT
     (x0, x1), (y0, y1) = field.x, field.y
     if y0 <= 0 <= y1:
@@ -195,7 +195,7 @@ def _write(pen: _Pen, field: _Field, ink: Rgb, *, has_pole: bool) -> None:
 
 
 def written_style(style: PictureStyle) -> PictureStyle:
-    """The style of pictures that are written on: half as large again, so that it can be read."""
+    """The style of pictures with text: half as large again, so that it is readable."""
     return replace(style, size_px=min(math.ceil(style.size_px * _GROWTH), LARGEST_PX))
 
 
@@ -205,7 +205,7 @@ def kit_png(candidates: CandidateSet, style: PictureStyle) -> bytes:
 
 
 def kit_sheet(candidates: CandidateSet, style: PictureStyle) -> Image.Image:
-    """Every candidate with its number, its dimensions, and a dot in the middle of its box."""
+    """Every candidate with its number, its dimensions, and a dot at the center of its box."""
     sheet, blocks, distance_m = candidates_grid(candidates, style)
     draw, side = ImageDraw.Draw(sheet), style.size_px / GRID_COLUMNS
     font = ImageFont.load_default(size=_TEXT * side)
@@ -227,6 +227,6 @@ def kit_sheet(candidates: CandidateSet, style: PictureStyle) -> Image.Image:
 
 
 def kit_key(candidates: CandidateSet, style: PictureStyle) -> str:
-    """SHA-256 [hex] of all that the sheet depends on."""
+    """SHA-256 [hex] of everything that the sheet depends on."""
     content = [astuple(candidate) for candidate in candidates.candidates]
     return picture_key("kit", style, [KIT_VERSION, "common", *content])

@@ -198,7 +198,7 @@ def test_what_physics_does_with_what_cannot_stand(
         ({"max_steps": 0}, "max_steps is 0"),
         ({"data": ()}, "no tasks"),
         ({"action": "pose", "physics": "off"}, "allowed: settle, strict"),
-        ({"action": "pose", "setting": "B"}, "leave them out"),
+        ({"action": "pose", "setting": "B"}, "remove them"),
         ({"action": "pose", "observe": "text"}, "of action='block' alone"),
         ({"levels": (2, 9)}, r"levels is \(2, 9\); allowed: several of \(1, 2, 3, 4, 5\)"),
     ],

@@ -1,1 +1,1 @@
-"""The verbs `phyblock scenes ...` and `phyblock questions ...`, one module each."""
+"""The commands `phyblock scenes ...` and `phyblock questions ...`, one module each."""

@@ -1,4 +1,4 @@
-"""Options that verbs share, and progress."""
+"""Options that commands share, and progress."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 
 
 class Several(click.ParamType[tuple[str, ...]]):
-    """Some of the known words, each once, with commas between them, or `all`."""
+    """A comma-separated list of known words, each once, or `all`."""
 
     name = "words"
 
@@ -49,7 +49,7 @@ _OPTIONS = (
 
 
 def making_options(command: Command) -> Command:
-    """Add the options of a verb that makes a set: seed, jobs, ray_address, shard, out."""
+    """Add the options of a command that makes a set: seed, jobs, ray_address, shard, out."""
     for option in reversed(_OPTIONS):
         command = option(command)
     return command
@@ -58,9 +58,9 @@ def making_options(command: Command) -> Command:
 def begin_set(
     shard: tuple[int, int] | None, out: Path, names: Sequence[str], work: str
 ) -> Shards | None:
-    """Return the shard, if any, that makes a set; StoreError where `out` has one.
+    """Return the shard, if any, that makes a set. Raises StoreError if `out` already has one.
 
-    Shards that go on may find the set, which the first one wrote.
+    Continued shards may find the set, which the first one wrote.
     """
     if shard is None or not shards_folder(out).exists():
         check_out(out, names)
@@ -70,13 +70,13 @@ def begin_set(
 def mapped(
     function: Callable[[T], R], items: Sequence[T], jobs: int, doing: str, noun: str = "scenes"
 ) -> list[R]:
-    """Return the function's answers for the items, from `jobs` processes, with progress shown."""
+    """Return the results of a function for the items, from `jobs` processes, with progress."""
     with open_workers(min(jobs, len(items) or 1)) as workers:
         return list(tracked(workers.map(function, items), len(items), doing, noun))
 
 
 def print_engine() -> None:
-    """Say on standard error where a set is not what the default engine makes of its seed."""
+    """Warn on standard error if the default engine may make another set from the same seed."""
     if other := other_engine():
         click.echo(
             f"made with {other}: the default one may make another set of the same seed", err=True
@@ -84,7 +84,7 @@ def print_engine() -> None:
 
 
 def conclude(name: str, problems: Iterable[Problem | str]) -> None:
-    """Print what failed and the verdict on a set; exit with 1 where something failed."""
+    """Print the problems and the verdict on a set; exit with 1 if there are problems."""
     failures = list(problems)
     for failure in failures:
         click.echo(f"failed: {failure}", err=True)

@@ -1,4 +1,4 @@
-"""`phyblock questions`: make questions about scenes, check them, look at them."""
+"""`phyblock questions`: make, check and show questions about scenes."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ _data_option = click.option(
 
 @click.group("questions")
 def questions() -> None:
-    """Make multiple-choice questions about scenes, check them, and look at them."""
+    """Make, check and show multiple-choice questions about scenes."""
 
 
 @questions.command("generate")
@@ -86,7 +86,7 @@ def generate(
     shard: tuple[int, int] | None,
     out: Path,
 ) -> None:
-    """Make questions, each with an answer that is derived, and their data card.
+    """Make questions with derived answers, and their data card.
 
     The same scenes, subtasks, numbers and seed give the same files with the same physics engine,
     on any Python, any number of processes or a cluster.
@@ -122,7 +122,7 @@ def verify(questions: str, data: str, jobs: int) -> None:
     Exits with 1 when an answer differs, a question is not fair, or a file has changed.
     """
     read = _read(questions, data)
-    # Questions about one scene follow one another, so that pictures are shared.
+    # Questions about one scene are processed together, so that pictures are shared.
     asked = sorted((task.question for task in read.tasks), key=lambda question: question.scene.id)
     problems = mapped(problem_of, asked, jobs, "Verifying", "questions")
     counts = Counter(question.subtask for question in asked)
