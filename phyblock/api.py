@@ -464,7 +464,7 @@ def tasks(
     """
     if track not in known_tracks():
         allowed, hint = ", ".join(known_tracks()), did_you_mean(track, known_tracks())
-        raise SpecError(Problem("tasks", "is no track", "track", track, allowed, hint))
+        raise SpecError(Problem("tasks", "is not a track", "track", track, allowed, hint))
     if split != "test" and (data is not None or track == "vqa"):
         message = "takes no data" if data is not None else "has no questions"
         hint = 'make a set with phyblock questions generate; give split="test", vqa.path=FOLDER'
@@ -514,13 +514,13 @@ def _given(data: Any) -> Dataset:
     """Return a caller's scenes as a data set. Raises SpecError for anything else, and repeats."""
     allowed = "the name or folder of a data set, a Dataset, or scenes"
     if not isinstance(data, Dataset | Iterable):
-        raise SpecError(Problem("tasks", "is no data", "data", repr(data), allowed))
+        raise SpecError(Problem("tasks", "is not a data set", "data", repr(data), allowed))
     dataset = data if isinstance(data, Dataset) else Dataset("data", Path("data"), tuple(data))
     known: set[str] = set()
     for place, one in enumerate(dataset.tasks):
         field = f"data[{place}]"
         if not isinstance(one, AssemblyTask):
-            raise SpecError(Problem("tasks", "is no scene", field, repr(one), allowed))
+            raise SpecError(Problem("tasks", "is not a scene", field, repr(one), allowed))
         if one.key in known:
             raise SpecError(Problem("tasks", "comes a second time", field, one.key))
         known.add(one.key)
@@ -625,7 +625,7 @@ def run_suite(
     if costly := [] if is_agreed else may_bill(plan, folder, **asks):
         found = ", ".join(row.model.name for row in costly if row.may_cost)
         hint = "agree with yes=True, or set a limit: load_suite(NAME, 'limits.max_cost_usd=5')"
-        where, message = f"suite {plan.suite.name}", "would cost money, and nobody agreed"
+        where, message = f"suite {plan.suite.name}", "would cost money, and was not confirmed"
         raise SpecError(Problem(where, message, found=found, hint=hint))
 
     def report(event: RunEvent) -> None:
@@ -639,7 +639,7 @@ def run_suite(
     if result.left:
         reason = f" ({result.stop.reason})" if result.stop else ""
         counts = f"{result.left:,} of {counted(result.samples, 'sample')} left{reason}"
-        remarks.append(f"{counts}: the same call again goes on")
+        remarks.append(f"{counts}: call run_suite again to continue")
     for remark in remarks:
         warnings.warn(remark, stacklevel=3)
     return load_run(folder)

@@ -157,7 +157,7 @@ def opened_bundle(path: Path, data: Sequence[Path] = ()) -> Iterator[Verified]:
 
 
 def _differs(where: object, field: str, made_by: str) -> StoreError:
-    message = "does not verify: scored again, it comes out differently"
+    message = "does not verify: rescored records differ"
     return StoreError(
         Problem(str(where), message, field, hint=f"{_HINT}; it was made by phyblock {made_by}")
     )
@@ -230,5 +230,5 @@ def unpack(path: Path, folder: Path) -> str:
     except FileNotFoundError as error:
         raise StoreError(Problem(str(path), "is not there")) from error
     except _BROKEN as error:
-        message, allowed = f"is no bundle, or is damaged: {reason_of(error)}", ", ".join(MEMBERS)
+        message, allowed = f"is not a bundle, or is damaged: {reason_of(error)}", ", ".join(MEMBERS)
         raise StoreError(Problem(str(path), message, allowed=allowed, hint=_HINT)) from error

@@ -187,7 +187,7 @@ def _open_picture(data: bytes, where: str) -> Image:
             picture = Image.open(io.BytesIO(data), formats=_PICTURE_FORMATS)
     except UnidentifiedImageError as error:
         found = f"a file that begins with {data[:12]!r}" if data else "an empty file"
-        raise DataError(Problem(where, "is no picture", "", found, _PICTURES_ALLOWED)) from error
+        raise DataError(Problem(where, "is not a picture", "", found, _PICTURES_ALLOWED)) from error
     except Exception as error:
         raise DataError(_damaged(where, reason_of(error))) from error
     width, height = picture.size
@@ -298,7 +298,7 @@ def write_named(path: Path, data: bytes | str | Iterable[bytes]) -> None:
     with writing(path):
         target = Path(os.path.realpath(path))
         if target.exists() and not stat.S_ISREG(target.stat().st_mode):
-            what = "a folder" if target.is_dir() else "no regular file"
+            what = "a folder" if target.is_dir() else "not a regular file"
             raise StoreError(Problem(str(path), f"cannot be written: it is {what}"))
         target.parent.mkdir(parents=True, exist_ok=True)
         atomic_write(target, data)
@@ -306,9 +306,9 @@ def write_named(path: Path, data: bytes | str | Iterable[bytes]) -> None:
 
 LIST = ".generated"
 """The file that lists what phyblock wrote into a folder."""
-_HEAD = "# What phyblock wrote here and may write again; all else is never touched."
+_HEAD = "# Files that phyblock wrote here and may overwrite; it never touches others."
 _LINK = "cannot be written: it is a link, and links are never followed or replaced"
-_MOVE = "move it away; phyblock writes over nothing that it did not make"
+_MOVE = "move it away; phyblock overwrites only its own files"
 
 
 class OutFolder:
@@ -340,7 +340,7 @@ class OutFolder:
             if folder.is_symlink():
                 problems[folder] = _LINK
             elif folder.exists() and not folder.is_dir():
-                problems[folder] = "cannot be written in: it is no folder"
+                problems[folder] = "cannot be written in: it is not a folder"
         for name in there:
             path = self.path / name
             if any(above in problems for above in path.parents):
@@ -348,7 +348,7 @@ class OutFolder:
             if path.is_symlink():
                 problems[path] = _LINK
             elif name not in known or not path.is_file():
-                problems[path] = "cannot be written: phyblock did not make what is there"
+                problems[path] = "cannot be written: phyblock did not make the existing file"
         if problems:
             raise StoreError(
                 Problem(str(path), message, hint=_MOVE) for path, message in problems.items()

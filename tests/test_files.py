@@ -74,7 +74,7 @@ def test_a_named_file_is_written_through_the_link_that_a_person_made(tmp_path: P
 
 def test_a_device_is_never_replaced(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
-    for path, said in ((tmp_path / "pipe", "no regular file"), (tmp_path, "a folder")):
+    for path, said in ((tmp_path / "pipe", "not a regular file"), (tmp_path, "a folder")):
         with pytest.raises(StoreError, match=said):
             write_named(path, "text")
     assert list(tmp_path.iterdir()) == [tmp_path / "pipe"]
@@ -164,10 +164,10 @@ def with_chunk(png: bytes, name: bytes, body: bytes) -> bytes:
 BOMB = zlib.compress(b"x" * (PngImagePlugin.MAX_TEXT_CHUNK + 1))
 GOOD = {name: encoded(name) for name in ("PNG", "JPEG", "GIF", "WEBP")}
 BAD = {
-    "eps": (EPS, "is no picture"),
-    "bmp": (encoded("BMP"), "is no picture"),
-    "tiff": (encoded("TIFF"), "is no picture"),
-    "text": (b"no picture", "is no picture"),
+    "eps": (EPS, "is not a picture"),
+    "bmp": (encoded("BMP"), "is not a picture"),
+    "tiff": (encoded("TIFF"), "is not a picture"),
+    "text": (b"no picture", "is not a picture"),
     "nothing": (b"", "an empty file"),
     "dot": (encoded("PNG", (1, 1)), "1 x 1 pixels"),
     "thin": (encoded("PNG", (64, 1)), "64 x 1 pixels"),

@@ -124,7 +124,7 @@ def test_nothing_is_spent_unasked_and_a_loop_may_run(
         "price: {input: 1, output: 1}}\n"
     )
     out = workspace.root / "paid"
-    with pytest.raises(SpecError, match=r"nobody agreed(.|\n)*yes=True"):
+    with pytest.raises(SpecError, match=r"was not confirmed(.|\n)*yes=True"):
         phyblock.run_suite("quick", models=["paid"], limit=1, out=out, models_file="billed.yaml")
     assert not out.exists()
 

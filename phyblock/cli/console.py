@@ -140,9 +140,9 @@ def print_path(console: Console, path: Path | str) -> None:
     console.print(shown_path(path) if isinstance(path, Path) else path, soft_wrap=True)
 
 
-def print_again(console: Console, how: str = "give") -> None:
+def print_again(console: Console, how: str = "run") -> None:
     """Print that the same command continues, and the command."""
-    console.print(f"To go on, {how} the same command again:")
+    console.print(f"To continue, {how} the same command again:")
     print_path(console, f"  {shlex.join(['phyblock', *sys.argv[1:]])}")
 
 
@@ -159,7 +159,7 @@ def may_spend(
         return True
     show()
     if is_asked:
-        return click.confirm("Go on?", default=True)
+        return click.confirm("Continue?", default=True)
     message = "would cost money, and there is no terminal to ask on"
     hint = "agree with --yes"
     if has_limit is not None:
@@ -194,7 +194,7 @@ def _shard(_: click.Context, __: click.Parameter, value: str | None) -> tuple[in
         return None
     found = re.fullmatch(r"([1-9]\d{0,4})/([1-9]\d{0,4})", value)
     if found is None or int(found[1]) > int(found[2]):
-        raise click.BadParameter(f"{value!r} is no shard: 3/64 is the third of 64")
+        raise click.BadParameter(f"{value!r} is not a shard: 3/64 is the third of 64")
     return int(found[1]), int(found[2])
 
 
@@ -214,13 +214,13 @@ _CLUSTER_OPTIONS = (
     click.option(
         *("--ray", "ray_address"),
         metavar="ADDRESS",
-        help="Work on this Ray cluster; local: on one of N workers here.",
+        help="Run on this Ray cluster; local: one with N workers on this machine.",
     ),
     click.option(
         "--shard",
         callback=_shard,
         metavar="I/N",
-        help="Be shard I of N programs that share the work through OUT.shards.",
+        help="Run as shard I of N programs that share the work through OUT.shards.",
     ),
 )
 
@@ -275,14 +275,14 @@ data_option = click.option(
     "--data",
     type=UserPath(exists=True, file_okay=False),
     metavar="DIR",
-    help="The data set, where it has moved.",
+    help="The data set, if it has moved.",
 )
 data_folders_option = click.option(
     "--data",
     type=UserPath(),
     metavar="DIR",
     multiple=True,
-    help="A folder of data that the run needs; may be given again.",
+    help="A folder of data that the run needs; may be repeated.",
 )
 run_out_option = click.option(
     "--out",

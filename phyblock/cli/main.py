@@ -106,7 +106,7 @@ class _Verbs(click.Group):
     expose_value=False,
     callback=_load_plugins,
     metavar="MODULE",
-    help="Import a Python module that adds shapes, tracks, measures, ...; may be given again.",
+    help="Import a Python module that adds shapes, tracks, measures, ...; may be repeated.",
 )
 @click.version_option(None, "-V", "--version", package_name="phyblock", prog_name="phyblock")
 def phyblock() -> None:

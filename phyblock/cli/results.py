@@ -296,7 +296,7 @@ def compare(
 
 @click.command()
 @run_argument
-@click.option("--only", "names", multiple=True, metavar="NAME", help="Only this figure; repeat.")
+@click.option("--only", "names", multiple=True, metavar="NAME", help="Only this one; repeatable.")
 @models_option("Only these models.")
 @click.option(
     "--width",
@@ -332,7 +332,7 @@ def figures(
     for file in drawn:
         print_path(console, file)
     if not drawn:
-        console.print("The run has no numbers for a figure.")
+        console.print("The run has no numbers for any figure.")
 
 
 @click.command()
@@ -368,7 +368,7 @@ def verify(file: Path, data: tuple[Path, ...]) -> None:
         console.print(f"{shown_path(file)} verifies.")
         samples = f"{verified.records:,} of {verified.expected:,} expected samples"
         is_whole = verified.records == verified.expected
-        console.print(f"{samples}." if is_whole else f"{samples}: the run is not whole.")
+        console.print(f"{samples}." if is_whole else f"{samples}: the run is not complete.")
         models = counted(len(verified.manifest.models), "model")
         records = counted(verified.records, "record")
         console.print(f"{records} of {models}, scored again, are the same bytes.")
@@ -382,7 +382,7 @@ def verify(file: Path, data: tuple[Path, ...]) -> None:
 @click.argument("runs", nargs=-1, required=True, type=UserPath())
 @click.option("--out", type=UserPath(), required=True, metavar="DIR", help="Folder of the site.")
 @data_folders_option
-@click.option("--title", default="PhyBlock leaderboard", help="Its heading.")
+@click.option("--title", default="PhyBlock leaderboard", help="Its title.")
 def site(runs: tuple[Path, ...], out: Path, data: tuple[Path, ...], title: str) -> None:
     """Write RUNS (run folders and bundles) as one static folder: ranks, a page for every model
     and scene, and every sample step by step.

@@ -66,7 +66,7 @@ _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 @click.argument("suite", type=NAME_OR_PATH)
 @sets_option
 @models_option(
-    "Run these models in place of the suite's: any of models.yaml, group:NAME for all of a group, "
+    "Run these models instead of the suite's: any of models.yaml, group:NAME for all of a group, "
     "or the baselines."
 )
 @limit_option
@@ -162,7 +162,7 @@ def _conclude(console: Console, folder: Path, result: RunResult, view: ProgressV
     console.print(f"{done}. Cost so far: {view.cost_text}{unanswered}.{cached}")
     cause = result.stop.cause if result.stop else None
     if result.left:
-        print_again(console, "raise limits.max_cost_usd and give" if cause == "cost" else "give")
+        print_again(console, "raise limits.max_cost_usd and run" if cause == "cost" else "run")
     if cause == "interrupted" and result.left:
         return INTERRUPTED
     return 1 if result.left or result.failed or result.unjudged else 0
@@ -223,7 +223,7 @@ def _dollars(cost_usd: float | None) -> str:
     "--name",
     required=True,
     metavar="NAME",
-    help="Who answers, as human:NAME in all tables: letters, digits, - and _; better no real name.",
+    help="Your name, human:NAME in tables: letters, digits, - and _; better not a real one.",
 )
 @sets_option
 @limit_option
@@ -232,12 +232,12 @@ def _dollars(cost_usd: float | None) -> str:
     type=UserPath(),
     multiple=True,
     metavar="RUN",
-    help="Show after the end how the models of this run folder did.",
+    help="Compare with the models of this run folder at the end.",
 )
 @run_out_option
 @click.option("--port", type=click.IntRange(0, 65535), default=0, show_default="any free one")
-@click.option("--exact", is_flag=True, help="Show the models' prompt unfolded, as for a study.")
-@click.option("--no-browser", is_flag=True, help="Print the address and open nothing.")
+@click.option("--exact", is_flag=True, help="Show the models' prompt from the start, for studies.")
+@click.option("--no-browser", is_flag=True, help="Print the address; open no browser.")
 def play(
     suite: str,
     name: str,
@@ -290,7 +290,7 @@ def play(
         server.files = report_files(folder)
         session.finish(Ending(folder, person.model, beside, plan.dataset.tasks))
         print_path(console, made)
-        console.print("All is answered; the page shows how it went. Ctrl-C ends.", style="dim")
+        console.print("All tasks are done; the page shows the results. Ctrl-C ends.", style="dim")
         with contextlib.suppress(KeyboardInterrupt):
             server.finished.wait()
     return 0

@@ -155,7 +155,7 @@ def _check(path: Path, sets: tuple[str, ...], models_file: str | None) -> list[s
         raise SpecError(problems)
     if not known:
         allowed = "a suite, or a models file with name: provider/model lines"
-        raise SpecError(Problem(str(path), "names nothing", allowed=allowed))
+        raise SpecError(Problem(str(path), "is empty", allowed=allowed))
     return [f"models file, {counted(len(known), 'model')}"]
 
 

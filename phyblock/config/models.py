@@ -310,7 +310,7 @@ class ModelConfig(Section):
             hint = "where the provider has the /files and /batches of OpenAI, use openai/... with "
             yield Fault(message, allowed, at=("batch",), hint=f"{hint}its api_base")
         if self.batch and len(self.addresses) > 1:
-            message = "is not possible with a list of servers: a batch lies at one"
+            message = "is not possible with a list of servers: a batch is at one of them"
             yield Fault(message, at=("batch",))
 
     @property
@@ -420,9 +420,9 @@ def _entry_faults(config: ModelConfig) -> Iterator[Fault]:
 def _name_faults(name: str) -> Iterator[Fault]:
     own = (*baseline_names(), RECORDED)
     if name in own:
-        yield Fault("is a name of phyblock's own", f"not {', '.join(own)}", "", key=True)
+        yield Fault("is a reserved name", f"not {', '.join(own)}", "", key=True)
     if name.startswith((GROUP, HUMAN)):
-        yield Fault("begins with a word of phyblock's own", f"not {GROUP}, {HUMAN}", "", key=True)
+        yield Fault("begins with a reserved prefix", f"not {GROUP}, {HUMAN}", "", key=True)
 
 
 _Entry = Annotated[
@@ -491,7 +491,7 @@ def resolve_models(
             continue
         message = "is neither in the models file nor a built-in baseline"
         if name.startswith(GROUP):
-            message = "is no group of the models file"
+            message = "is not a group of the models file"
         elif name.startswith(HUMAN):
             message = "is a person, who answers in `phyblock play`"
         hint = did_you_mean(name, allowed) or "list them: phyblock models"

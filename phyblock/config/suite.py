@@ -439,12 +439,12 @@ class Suite(Section):
         other = "set dataset.format to official and dataset.path to a checkout, or this to another"
         clashes = (
             (recorded and not official, "models",
-             "recorded replies come with the official data set only", other),
+             "only the official data set has recorded replies", other),
             (official_prompt and not official, "prompt",
-             "the official prompt is read out of an official checkout", other),
+             "the official prompt is read from an official checkout", other),
             (own_pictures and not official, "images.source",
-             "only the official data set has pictures of its own", other),
-            (as_json and recorded, "answer_format", "recorded replies were asked for in text", ""),
+             "only the official data set has its own pictures", other),
+            (as_json and recorded, "answer_format", "recorded replies are text", ""),
             (as_json and official_prompt, "answer_format", "the official prompt asks for text", ""),
             (as_json and self.parser == "official", "parser", "this parser reads no JSON", ""),
             (shuffled and own_pictures, "candidates.order",
@@ -461,7 +461,7 @@ class Suite(Section):
         at, paths = ("vary", factor), self.fields_of(factor)
         for kind in map(known_track, self.tracks):
             if factor not in kind.varies:
-                message = f"has no meaning in {kind.name}"
+                message = f"does not apply to {kind.name}"
                 yield Fault(message, ", ".join(kind.varies), at=at, key=True)
                 return
         if len(paths) > 1:
@@ -477,7 +477,7 @@ class Suite(Section):
             section = functools.reduce(getattr, path[:-1], self)
             if path[-1] in section.model_fields_set and getattr(section, path[-1]) != first:
                 message = f"is varied by vary.{factor}, whose first level is the reference"
-                yield Fault(message, str(first), at=path, hint="leave it out, or change vary")
+                yield Fault(message, str(first), at=path, hint="remove it, or change vary")
         for place, level in enumerate(self.vary.names(factor)):
             one = self.at(Variant(((factor, level),))).model_dump(exclude={"vary"})
             try:

@@ -173,7 +173,7 @@ def _repeated(items: tuple[Hashable, ...]) -> Iterator[Fault]:
     seen: set[Hashable] = set()
     for index, item in enumerate(items):
         if item in seen:
-            yield Fault("stands twice in this list", at=(index,), hint="keep one of them")
+            yield Fault("is listed twice", at=(index,), hint="remove one of them")
         seen.add(item)
 
 
@@ -296,7 +296,7 @@ def _fault(detail: ErrorDetails, path: FieldPath, value: Any, model: type[BaseMo
     elif kind == "string_pattern_mismatch":
         allowed = _FORMS.get(context["pattern"], context["pattern"])
     elif kind in ("int_type", "float_type") and shown(value).strip('"').isdecimal():
-        hint = "take the quotes off"
+        hint = "remove the quotes"
     elif kind == "string_type" and isinstance(value, int | float):
         hint = f'put it in quotes: "{value}"'
     elif kind == "tuple_type" and (listed := _listed(name, value)):

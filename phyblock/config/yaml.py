@@ -268,7 +268,7 @@ class _Walker:
         text = self._text(node, path)
         lower = text.lower()
         if kind in ("int", "float") and len(text) > _LONGEST_NUMBER:
-            raise self._error(node, path, "is too large a number", f"{len(text):,} digits")
+            raise self._error(node, path, "is a number that is too large", f"{len(text):,} digits")
         try:
             if kind == "int":
                 return int(lower, {"0o": 8, "0x": 16}.get(lower[:2], 10))
@@ -309,7 +309,7 @@ def secrets(source: YamlSource) -> list[Problem]:
         elif isinstance(data, str):
             named = len(path) > 1 and str(path[-1]).lower() in _SECRET_KEYS
             if named or looks_secret(data):
-                message = "looks like a key, which must not stand in a file"
+                message = "looks like a key, which must not be in a file"
                 yield Problem(source.where(path), message, dotted(path), hint=hint)
 
     return list(below(source.data, ()))
@@ -345,7 +345,7 @@ def apply_overrides(source: YamlSource, overrides: Iterable[str]) -> list[Proble
                     source.overridden[parts[:end]] = place
                 here = here[part]
         if not isinstance(here, dict):
-            message = "cannot be set inside of what is not a mapping"
+            message = "cannot be set: it is inside a value that is not a mapping"
             problems.append(Problem(place, message, dotted(parts), shown(here)))
             continue
         here[last] = value

@@ -179,7 +179,7 @@ def _option_faults(options: Sequence[str]) -> Iterator[Fault]:
     for i, option in enumerate(options):
         first = read.index(read[i])
         if first != i:
-            message = f"is the same as option {LETTERS[first]}" if first < 4 else "stands twice"
+            message = f"is the same as option {LETTERS[first]}" if first < 4 else "is listed twice"
             yield Fault(message, "four options that differ", shown(option), (i,))
     wanted = [f"<img{i}>" for i in range(1, len(LETTERS) + 1)]
     if any(map(is_picture_option, options)) and list(options) != wanted:

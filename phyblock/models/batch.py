@@ -304,7 +304,7 @@ class BatchModel:
         else:
             raise UnavailableError(
                 f"the answers of batch {batch.shown} are gone ({path}): without its lines in "
-                f"{BATCHES} its questions are asked again"
+                f"{BATCHES} its requests are sent again"
             )
         if lines is not None:
             batch.is_blank = not lines.strip()
@@ -368,7 +368,7 @@ class BatchModel:
         except UnavailableError as error:
             why = (
                 f"it is not known whether a batch was sent: {error}. If it was not, remove the "
-                f"lines of {batch.token} from {BATCHES}: its questions are then asked again"
+                f"lines of {batch.token} from {BATCHES}: its requests are then sent again"
             )
             raise UnsureError(why, status=error.status, sent=error.sent) from None
 

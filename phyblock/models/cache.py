@@ -162,7 +162,7 @@ class ReplyCache:
         tables = self._db.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
         self._db.execute("COMMIT")
         if version != SCHEMA and (version != 0 or tables != 0):
-            message = "belongs to another version of phyblock, or is no reply cache"
+            message = "belongs to another version of phyblock, or is not a reply cache"
             found, allowed = f"schema {version}", f"schema {SCHEMA}"
             raise self._problem(message, found=found, allowed=allowed)
         self._db.execute("PRAGMA journal_mode = WAL")

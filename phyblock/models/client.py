@@ -381,7 +381,7 @@ def read_raw_reply(raw: object, where: str) -> Reply:
         return _reply(text)
     found = f"keys {', '.join(map(str, raw))}" if isinstance(raw, Mapping) else type(raw).__name__
     allowed = "a chat completion, an Anthropic message, a Gemini response, predict, text, response"
-    raise DataError(Problem(where, "is no recorded reply of a known shape", "", found, allowed))
+    raise DataError(Problem(where, "is not a recorded reply of a known shape", "", found, allowed))
 
 
 def read_chat_completion(raw: object) -> Reply | None:

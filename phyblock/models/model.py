@@ -350,7 +350,7 @@ class Servers:
     def _refuse(self, server: Server, error: UnavailableError) -> None:
         is_first, server.refusal = server.refusal is None, error
         if is_first and any(other.refusal is None for other in self.all):
-            self._report(f"{server.name} is asked no more: {error}")
+            self._report(f"{server.name} is not used any more: {error}")
 
     def _rest_of(self, server: Server) -> float:
         doubled_s = self._policy.base_s * 2.0 ** min(server.rests, 60)

@@ -84,7 +84,7 @@ def open_baseline(config: ModelConfig) -> LocalModel:
     name = config.name
     if name not in baseline_names():
         allowed = ", ".join(baseline_names())
-        raise SpecError(Problem(f"model {name}", "is no baseline", "", name, allowed))
+        raise SpecError(Problem(f"model {name}", "is not a baseline", "", name, allowed))
     rules = baseline_rules(name)
 
     def answer(request: Request) -> Reply:

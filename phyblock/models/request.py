@@ -58,7 +58,7 @@ class Image:
             mime = "image/webp"
         if not mime:
             where, found = f"picture {self.label!r}", repr(self.data[:8])
-            raise DataError(Problem(where, "is no picture", "", found, "PNG, JPEG, GIF or WebP"))
+            raise DataError(Problem(where, "is not a picture", "", found, "PNG, JPEG, GIF or WebP"))
         return f"data:{mime};base64,{base64.b64encode(self.data).decode('ascii')}"
 
 

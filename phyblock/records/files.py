@@ -73,7 +73,7 @@ def _same_names(models: tuple[ManifestModel, ...]) -> Iterator[Fault]:
     names = [model.name for model in models]
     for index, name in enumerate(names):
         if name in names[:index]:
-            yield Fault("stands twice in this list", found=name, at=(index, "name"))
+            yield Fault("is listed twice", found=name, at=(index, "name"))
 
 
 class ManifestDataset(Line):

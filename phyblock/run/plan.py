@@ -182,7 +182,7 @@ def _check_models(models: Sequence[ModelConfig], tracks: Sequence[Track], suite:
     for model in models:
         is_replay = model.kind == "replay"
         if is_replay and suite.vary.factors:
-            message = "is a recording, which was asked in one way"
+            message = "is a recording, which cannot be varied"
             refuse(model, message, "vary", ", ".join(suite.vary.factors))
             continue
         if model.recording is not None:
@@ -197,11 +197,11 @@ def _check_models(models: Sequence[ModelConfig], tracks: Sequence[Track], suite:
                 refuse(model, f"is a recording, which cannot answer in {track.name}", "tracks")
             if model.batch and plays:
                 message = f"is asked in batches, and {track.name} plays episodes of several turns"
-                hint = "each turn waits for the one before: take batch: true out, or the track"
+                hint = "each turn waits for the one before: remove batch: true, or the track"
                 refuse(model, message, "batch", track.name, "", hint)
             if model.kind == "human" and track.by_hand is None:
                 message = f"is a person, who cannot answer in {track.name}"
-                refuse(model, message, "tracks", "", "", f"leave {track.name} out of tracks")
+                refuse(model, message, "tracks", "", "", f"remove {track.name} from tracks")
             if model.kind == "baseline" and model.name not in able:
                 refuse(model, f"has no rule for {track.name}", "models", "", ", ".join(able))
     if problems:
@@ -273,7 +273,7 @@ def to_config(name: str, known: ModelConfig, suite: Suite) -> ModelConfig:
     sends = sends and (config.response_format == "always" or takes_format(config))
     if sends and "response_format" in config.extra_body:
         message = "sets its own response_format, but the suite asks for one"
-        hint = "take it out of extra_body, or set response_format: never to send it all the same"
+        hint = "remove it from extra_body, or set response_format: never to send it anyway"
         field = "extra_body.response_format"
         raise SpecError(Problem(f"model {config.name}", message, field, hint=hint))
     return config.model_copy(update={"response_format": "always" if sends else "never"})
@@ -305,7 +305,7 @@ def provider_problem(config: ModelConfig, where: str) -> Problem | None:
     providers = known_providers(config)
     if config.provider in providers:
         return None
-    message, hint = "is of no provider that is known", did_you_mean(config.provider, providers)
+    message, hint = "has an unknown provider", did_you_mean(config.provider, providers)
     if config.addresses:
         hint = f"a server of your own that speaks OpenAI's chat protocol: hosted_vllm/{config.id}"
     allowed = "provider/model, as litellm names them"

@@ -77,7 +77,7 @@ def rescore(
     for name, count in (+diverged).items():
         report(
             f"{kind_of(name).title}: in {counted(count, 'episode')} this version would have asked "
-            "something else; phyblock run asks on from there"
+            "something else; phyblock run continues from there"
         )
 
 

@@ -93,7 +93,7 @@ class Stopping:
         """Message to the person who stopped it: what it waits for, and how to cancel that."""
         if not self.in_flight:
             return f"Stopping: {self.reason}."
-        calls = f"{counted(self.in_flight, 'call')} under way"
+        calls = f"{counted(self.in_flight, 'call')} in progress"
         return f"Stopping: {self.reason}; waiting for {calls} (Ctrl-C again to give them up)."
 
 
@@ -143,7 +143,7 @@ def check_ready(plan: RunPlan) -> None:
             problems.append(unknown)
         elif status.is_needed and not status.is_set:
             names = " or ".join(status.variables)
-            hint = f"set {names} in the environment, or leave the model out with --models"
+            hint = f"set {names} in the environment, or exclude the model with --models"
             message = "needs an API key, and none is set"
             problems.append(Problem(where, message, "", config.id, hint=hint))
     if problems:
@@ -273,7 +273,7 @@ class Session:
         from phyblock.models.batch import BatchFiles, under_way
 
         lines = tuple(self._store.progress.batches)
-        message = "has a batch under way, whose questions would be asked twice"
+        message = "has a batch in progress, whose questions would be asked twice"
         hint = f"let it end with batch: true, or remove its lines from {BATCHES} to give it up"
         if problems := [
             Problem(f"model {model.name}", message, "batch", waiting[0].shown, hint=hint)
@@ -338,7 +338,7 @@ class Session:
             except Exception as error:
                 # An internal error must not lose calls that are paid for.
                 self._failure = self._failure or error
-                self._stop(Stopping("error", "an error that the run cannot go on with"))
+                self._stop(Stopping("error", "an internal error"))
 
     @property
     def under_way(self) -> int:

@@ -60,7 +60,7 @@ LineT = TypeVar("LineT", bound=Line)
 
 _HEADLINE = "aov"
 _OTHER_FOLDER = "choose another folder with --out"
-_APPENDING = "free some space and give the same command again: it goes on from here"
+_APPENDING = "free some space and run the same command again to continue"
 
 
 class AppendFile:
@@ -440,7 +440,7 @@ def check_place(folder: Path) -> None:
         hint = "name a new or an empty folder with --out"
         raise StoreError(Problem(str(folder), message, found=found, hint=hint))
     if links := [folder / name for name in _OWN if (folder / name).is_symlink()]:
-        message = "is a link, and a run writes nowhere but in its own folder"
+        message = "is a link, and a run writes only in its own folder"
         raise StoreError([Problem(str(path), message, hint=_OTHER_FOLDER) for path in links])
 
 

@@ -461,7 +461,7 @@ def in_order(
     """
     n = len(task.candidates)
     if len(set(numbers)) < len(numbers) or not set(numbers) <= set(range(1, n + 1)):
-        where, message = f"scene {task.key}", "is no order of its candidates"
+        where, message = f"scene {task.key}", "is not an order of its candidates"
         found, allowed = ", ".join(map(str, numbers)), f"the numbers 1 to {n}, each once"
         raise DataError(Problem(where, message, "shown.order", found, allowed))
     shown = CandidateSet(tuple(task.candidates[number] for number in numbers))

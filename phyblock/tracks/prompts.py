@@ -189,7 +189,7 @@ def _included(name: str, folders: Sequence[Path], where: str) -> Path | None:
     if not is_open or (path is not None and not parts[-1].endswith(".j2")):
         allowed = "a file that ends in .j2, beside the template or below it, no part of whose path "
         allowed += "begins with a dot"
-        raise PromptError(Problem(where, "includes what is no template", "", name, allowed))
+        raise PromptError(Problem(where, "includes what is not a template", "", name, allowed))
     return path
 
 

@@ -111,7 +111,7 @@ def _check_place(folder: OutFolder) -> None:
     """Raise StoreError unless the folder is new, empty, or holds a site."""
     out = folder.path
     if out.exists() and not out.is_dir():
-        raise StoreError(Problem(str(out), "is no folder"))
+        raise StoreError(Problem(str(out), "is not a folder"))
     with writing(out, "choose another folder with --out"):
         found = {entry.name for entry in os.scandir(out)} if out.exists() else set()
     strangers = sorted(n for n in found if n != LIST and not _PARTIAL.fullmatch(n))
@@ -165,7 +165,7 @@ def check_runs_alike(runs: Sequence[SiteRun]) -> None:
         for first in runs[:number]:
             shared = [track for track in one.tracks if track in first.tracks]
             told, wanted = (_facts(side.run, shared) for side in (one, first))
-            message = f"cannot stand in one table with {first.where}"
+            message = f"cannot share a table with {first.where}"
             differences = [
                 Problem(one.where, message, name, str(value), str(other), hint)
                 for name, value in told.items()

@@ -49,7 +49,7 @@ class Person:
     def __post_init__(self) -> None:
         if not _NAME.fullmatch(self.name):
             allowed = "1 to 40 letters a-z, A-Z, digits, - and _, with a letter or digit first"
-            raise SpecError(Problem("--name", "is no name", "", self.name, allowed))
+            raise SpecError(Problem("--name", "is not a valid name", "", self.name, allowed))
 
     @property
     def model(self) -> str:
@@ -64,7 +64,7 @@ def plan_session(suite: Suite, person: Person, limit: int | None) -> RunPlan:
     errors of `make_plan`.
     """
     if suite.vary.factors:
-        message, hint = "asks in several ways, and a person is asked once", "take `vary` out"
+        message, hint = "varies its presentation, and a person is asked once", "remove `vary`"
         found = ", ".join(suite.vary.factors)
         raise SpecError(Problem(suite.where("vary"), message, "vary", found, hint=hint))
     once = suite.model_copy(update={"seeds": suite.seeds[:1]})

@@ -86,7 +86,7 @@ def test_a_terminal_shows_bars_and_then_the_tables(suite: Workspace) -> None:
         )
     assert code == 0
     assert "Traceback" not in screen
-    assert "Go on?" not in screen
+    assert "Continue?" not in screen
     assert "[/bold] busy [blink" in screen
     assert screen.index("20/20") < screen.index("Full planning, suite trial")
     assert "All 40 samples are done" in screen
@@ -101,7 +101,7 @@ def test_a_person_is_asked_before_money_is_spent(
         found, screen = in_terminal(suite, answer, "--models", "alpha")
         assert (found, running.server.requests) == (code, calls)
     assert "5 calls, about $" in screen
-    assert "Go on?" in screen
+    assert "Continue?" in screen
     assert ("Nothing was asked." in screen) == (calls == 0)
     assert suite.out.exists() == (code == 0)
 
@@ -213,7 +213,7 @@ def test_a_tilde_is_the_home_folder(suite: Workspace, monkeypatch: pytest.Monkey
 
 
 IN_THE_WAY: dict[str, tuple[Prepare, str]] = {
-    "report": (lambda run: put(run / "report"), "report: cannot be written in: it is no folder"),
+    "report": (lambda run: put(run / "report"), "report: cannot be written in: it is not a folder"),
     "linked-report": (lambda run: link(run / "report"), "report: .*it is a link"),
     "linked-tables": (lambda run: link(run / "tables"), "tables: .*it is a link"),
     "page": (lambda run: put(run / "report.html"), r"report\.html: .*phyblock did not make"),

@@ -119,7 +119,7 @@ def test_missing_recordings_and_unknown_providers_are_found(workspace: Workspace
     assert "models.yaml:2:11: far.replay: recordings not found" in done.err
     # Of the suite its own models alone are looked at.
     assert done.err.count("far.replay") == 1
-    assert done.err.count("models.yaml:4:7: odd.id: is of no provider that is known") == 2
+    assert done.err.count("models.yaml:4:7: odd.id: has an unknown provider") == 2
     assert "did you mean openai?" in done.err
     assert "own.id" not in done.err
     assert "straight.id" not in done.err

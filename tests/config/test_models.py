@@ -123,7 +123,7 @@ def test_names_and_groups_stand_for_models_in_the_order_of_the_file(tmp_path: Pa
     with pytest.raises(SpecError) as caught:
         resolve_models(["group:al", "c", "orcale", "human:x"], known, str)
     assert [(p.where, p.message, p.hint) for p in caught.value.problems] == [
-        ("0", "is no group of the models file", "did you mean group:all?"),
+        ("0", "is not a group of the models file", "did you mean group:all?"),
         ("2", "is neither in the models file nor a built-in baseline", "did you mean oracle?"),
         ("3", "is a person, who answers in `phyblock play`", "list them: phyblock models"),
     ]

@@ -153,7 +153,7 @@ def test_paths_start_at_the_file_or_for_overrides_at_the_working_directory(
 
 
 def test_a_suite_made_in_python_obeys_the_rules_between_fields() -> None:
-    with pytest.raises(ValidationError, match="recorded replies come with the official data"):
+    with pytest.raises(ValidationError, match="only the official data set has recorded replies"):
         SUITE_MODEL.model_validate({"name": "s", "models": "recorded"})
 
 

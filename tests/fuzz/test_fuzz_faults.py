@@ -113,7 +113,7 @@ def one_round(workspace: Workspace, server: LedgerChat, track: str) -> None:
     first = len(ledger.entries)
     for _ in range(10):
         done = run(workspace)
-        if "To go on" not in done.out:
+        if "To continue" not in done.out:
             break
     asked = len(ledger.entries)
     assert run(workspace).code == (1 if ledger.that_came_to("sample") else 0), done.out + done.err

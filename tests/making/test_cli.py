@@ -147,8 +147,8 @@ def test_a_season_is_made_again_from_what_was_revealed_and_from_nothing_else(
         (("scenes", "--levels", "1,1"), "give all, or some of 1,2,3,4"),
         (("scenes", "--count", "0"), "0 is not in the range"),
         (("scenes", "--palette", "wood"), "'wood' is not one of"),
-        (("scenes", "--shard", "5/4"), "is no shard: 3/64 is the third of 64"),
-        (("questions", "--shard", "0/4"), "is no shard"),
+        (("scenes", "--shard", "5/4"), "is not a shard: 3/64 is the third of 64"),
+        (("questions", "--shard", "0/4"), "is not a shard"),
         *((("questions", "--subtasks", bad), "some of SH,CO,SI") for bad in ("XX", "CO,CO", "")),
     ],
 )

@@ -291,7 +291,7 @@ def test_a_server_that_refuses_everything_is_left_out_and_the_last_one_stops_the
         assert right.ended == {"ok": 30}
         assert wrong.requests <= 4
         (text,) = told
-        assert text.startswith(f"{first.url} is asked no more: ")
+        assert text.startswith(f"{first.url} is not used any more: ")
         right.faults = Faults(mode="404")
         stopped = ask(make_model(config), *map(make_request, names(30)))
     assert {type(answer) for answer in stopped} == {UnavailableError}

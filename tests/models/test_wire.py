@@ -217,7 +217,7 @@ def test_a_body_made_around_the_encoder_says_what_the_encoder_would(
 
 def test_only_pictures_are_sent_as_pictures() -> None:
     request = make_request(pictures=(b"<html>", picture(1)))
-    with pytest.raises(DataError, match=r"'goal'.*is no picture"):
+    with pytest.raises(DataError, match=r"'goal'.*is not a picture"):
         wire_messages(request.messages, None)
 
 

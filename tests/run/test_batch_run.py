@@ -85,7 +85,7 @@ def test_a_run_that_waits_is_stopped_and_goes_on_by_the_same_command(workspace: 
         assert (process.returncode, err) == (130, "")
         assert "waiting for batch batch-0 since" in out
         assert "0 of 10 samples are done (interrupted)" in out
-        assert "give the same command again" in out
+        assert "run the same command again" in out
 
         dry = workspace.run("--dry-run")
         (row,) = (line.split() for line in dry.out.splitlines() if line.startswith("alpha "))
@@ -99,7 +99,7 @@ def test_a_run_that_waits_is_stopped_and_goes_on_by_the_same_command(workspace: 
         (workspace.root / "singly.yaml").write_text(text.replace("batch: true", "batch: false"))
         singly = workspace.run("--yes", "--models-file", "singly.yaml")
         assert singly.code == 2
-        assert "has a batch under way, whose questions would be asked twice" in singly.err
+        assert "has a batch in progress, whose questions would be asked twice" in singly.err
         assert not server.by_sample
 
         server.batch_faults = BatchFaults()

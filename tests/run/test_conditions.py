@@ -260,4 +260,4 @@ def test_questions_and_episodes_vary_what_they_know(workspace: Workspace) -> Non
     workspace.write_yaml("models.yaml", {"old": {"replay": "./out"}})
     refused = workspace.run("--models", "old", "--out", workspace.root / "other")
     assert refused.code == 2
-    assert "was asked in one way" in refused.err
+    assert "cannot be varied" in refused.err

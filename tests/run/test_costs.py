@@ -57,7 +57,7 @@ def test_the_limit_is_not_passed_and_a_higher_one_goes_on(workspace: Workspace) 
         first = workspace.run("--set", f"limits.max_cost_usd={MOST_USD}")
         assert (first.code, first.err) == (1, "")
         assert f"max_cost_usd {MOST_USD} is reached" in first.out
-        assert "give the same command again" in first.out
+        assert "run the same command again" in first.out
         assert spent(workspace) == pytest.approx(CALL_USD * server.requests)
         # It stops no earlier than it must: another two calls at their dearest would pass it.
         assert MOST_USD - 2 * (CALL_USD + 100 * PRICE["output"] / 1e6) < spent(workspace)

@@ -85,7 +85,7 @@ def test_a_model_that_cannot_answer_is_stopped_alone(workspace: Workspace) -> No
         assert "locked was stopped: HTTP 401: Incorrect API key provided" in done.out
         assert "unknown was stopped: HTTP 404: The model unknown does not exist" in done.out
         assert "100 of 300 samples are done" in done.out
-        assert "give the same command again" in done.out
+        assert "run the same command again" in done.out
         # Reports made later, from the folder alone, know it too.
         stopped = read_stopped(workspace.out).models
         assert {name: why[:8] for name, why in stopped.items()} == {
@@ -118,7 +118,7 @@ def test_a_server_that_is_gone_stops_its_model_and_leaves_the_samples(
     assert done.out.count("http://127.0.0.1:9 cannot be reached, trying now and then") == 1
     assert "alpha was stopped: http://127.0.0.1:9 could not be reached" in done.out
     assert "100 of 200 samples are done" in done.out
-    assert "give the same command again" in done.out
+    assert "run the same command again" in done.out
     assert {record["model"] for record in workspace.records()} == {"random"}
     assert coverage(workspace)["alpha"]["api_error"] == "0"
 

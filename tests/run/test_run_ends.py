@@ -63,7 +63,7 @@ def interrupted(process: Forked, server: OpenAIChat, name: signal.Signals) -> tu
     wait_for(lambda: server.at_once == AT_ONCE)
     process.send_signal(name)
     assert process.stdout is not None
-    assert f"waiting for {AT_ONCE} calls under way" in process.stdout.readline()
+    assert f"waiting for {AT_ONCE} calls in progress" in process.stdout.readline()
     server.holds = False
     return ended(process)
 
@@ -115,7 +115,7 @@ def test_a_second_interrupt_ends_at_once(workspace: Workspace) -> None:
         code, out, err = ended(process)
     assert (code, err) == (130, "")
     assert f"0 of {SAMPLES} samples are done (interrupted)" in out
-    assert "give the same command again" in out
+    assert "run the same command again" in out
     assert not workspace.records()
 
 

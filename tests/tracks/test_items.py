@@ -75,7 +75,7 @@ def test_orders_stay_as_they_were_drawn(tasks: tuple[AssemblyTask, ...]) -> None
     assert shown_order(tasks[0], 0)[:6] == (5, 9, 7, 4, 2, 11)
     assert shown_order(tasks[0], 1)[:6] == (14, 12, 15, 11, 13, 10)
     for order in ([1, 1, 2], [0, 1], [17]):
-        with pytest.raises(DataError, match="no order of its candidates"):
+        with pytest.raises(DataError, match="not an order of its candidates"):
             in_order(tasks[0], order)
 
 

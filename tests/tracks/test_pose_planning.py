@@ -258,7 +258,7 @@ def test_a_run_that_was_cut_goes_on_and_is_scored_again_without_an_engine(
         (["abov"], "is not one of the choices"),
         (["top"], "allowed: [oblique, top]"),
         (["front", "oblique"], "allowed: [oblique, front]"),
-        (["oblique", "oblique"], "stands twice"),
+        (["oblique", "oblique"], "is listed twice"),
     ],
 )
 def test_a_view_that_is_none_or_cannot_carry_the_sheet_is_said(views: list[str], told: str) -> None:

@@ -316,9 +316,9 @@ def stored_prompt(run: Path, record: Raw) -> list[object]:
 @pytest.mark.parametrize(
     ("words", "error"),
     [
-        (["--name", "Ada Lovelace"], "--name: is no name"),
+        (["--name", "Ada Lovelace"], "--name: is not a valid name"),
         (["--name", "x", "--beside", "nowhere"], "nowhere"),
-        (["--name", "x", "--set", "vary.repeats=2"], "asks in several ways"),
+        (["--name", "x", "--set", "vary.repeats=2"], "varies its presentation"),
     ],
 )
 def test_what_cannot_be_played_is_said_before_anything_is_begun(
