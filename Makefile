@@ -6,6 +6,9 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 RUNS := $(VENV)/.runs
 TESTS := $(VENV)/.tests
 
+# What Python compiles is kept for its next start, also where a container sets this.
+export PYTHONDONTWRITEBYTECODE :=
+
 # What `make fuzz` tries; SEED=n tries the same again.
 SEED ?= $(shell date +%s)
 INPUTS ?= 2400
