@@ -417,12 +417,12 @@ def orientation_class(block_type: BlockType, euler_deg: Euler) -> tuple[float, .
     rotations that are indistinguishable from the given one.
     """
     rotation = euler_deg_to_matrix(euler_deg)
-    alike = np.round(rotation @ symmetries(block_type), 4) + 0.0
-    return min(tuple(float(entry) for entry in matrix.ravel()) for matrix in alike)
+    equivalent = np.round(rotation @ symmetries(block_type), 4) + 0.0
+    return min(tuple(float(entry) for entry in matrix.ravel()) for matrix in equivalent)
 
 
 def turn_deg(block_type: BlockType, one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
     """The least angle [degrees] between two rotations (3, 3) of a block, up to its symmetry."""
-    alike = one @ symmetries(block_type)
-    cosines = (np.einsum("kij,ij->k", alike, other) - 1) / 2
+    equivalent = one @ symmetries(block_type)
+    cosines = (np.einsum("kij,ij->k", equivalent, other) - 1) / 2
     return math.degrees(math.acos(min(1.0, max(-1.0, float(cosines.max())))))

@@ -61,11 +61,11 @@ from phyblock.tracks.measures import SCORED_BY, Cell, Measure, in_unit
 
 _LEVEL = 1 - CONFIDENCE
 _KEYS = ["scene", "item", "seed", "variant"]
-_TOLD = ("p_holm", "verdict", "detectable", "detectable_holm")
+_JOINT = ("p_holm", "verdict", "detectable", "detectable_holm")
 """Columns of `Comparison.table` that depend on all of its tests."""
 
 
-def check_alike(run: Run, first: Run, cells: Sequence[str], track: str, measure: Measure) -> None:
+def check_pair(run: Run, first: Run, cells: Sequence[str], track: str, measure: Measure) -> None:
     """Raise SpecError if `run` cannot be compared with `first` by a measure in these cells.
 
     They must have the same version of the data set, scoring rules, conditions, and values of the
@@ -94,7 +94,7 @@ def check_alike(run: Run, first: Run, cells: Sequence[str], track: str, measure:
     for (field, known, needed), is_scored in zip(rules, scored, strict=True):
         for name in sorted(needed.difference(known)) if is_scored else ():
             need(field, ", ".join(known), name, "phyblock score reads stored replies again")
-    for path in measure.counted.alike:
+    for path in measure.counted.same:
         need(path, _field(run, path), _field(first, path), "run the older one again")
     blocks = [
         one.records.drop_duplicates("scene").set_index("scene")["n_blocks"] for one in (first, run)
@@ -251,7 +251,7 @@ class Comparable:
         ends = {name: scale * float(getattr(estimate, name)) for name in ("se", "lo", "hi")}
         return {
             **{"value_a": value_a, "value_b": value_b, "difference": scale * float(estimate.value)},
-            **{**ends, "p": float(estimate.p), **dict.fromkeys(_TOLD), "better": (sign > 0).sum()},
+            **{**ends, "p": float(estimate.p), **dict.fromkeys(_JOINT), "better": (sign > 0).sum()},
             **{"worse": (sign < 0).sum(), "same": (sign == 0).sum(), "n_samples": len(sign)},
             **{"n_scenes": len(scenes), "n_clusters": clusters.size},
         }
@@ -379,7 +379,7 @@ def compare(
     place = {side.label: n for n, side in enumerate(sides)}
     runs = list({id(side.run): side.run for side in sides}.values())
     for run in runs[1:]:
-        check_alike(run, runs[0], [part.cell for part in parts], what.track, what.measure)
+        check_pair(run, runs[0], [part.cell for part in parts], what.track, what.measure)
     parents = {scene: found for run in runs for scene, found in base_scenes(run).items()}
     rows = []
     for part in parts:

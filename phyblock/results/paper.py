@@ -35,8 +35,8 @@ class _Published:
 
 
 _TABLES = {
-    n: _Published(**told)
-    for n, told in yaml.safe_load((_FOLDER / "tables.yaml").read_text(encoding="utf-8")).items()
+    n: _Published(**table)
+    for n, table in yaml.safe_load((_FOLDER / "tables.yaml").read_text(encoding="utf-8")).items()
 }
 PAPER_TABLES = tuple(_TABLES)
 """Numbers of the paper's results tables."""

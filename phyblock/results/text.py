@@ -74,10 +74,10 @@ class TextTable:
         rows, above = [], None
         for row in frame.to_dict("records"):
             texts = [column.show(row) for column in columns]
-            told = [text for text, column in zip(texts, columns, strict=True) if column.once]
-            if told == above:
+            once = [text for text, column in zip(texts, columns, strict=True) if column.once]
+            if once == above:
                 texts = ["" if c.once else text for text, c in zip(texts, columns, strict=True)]
-            above = told
+            above = once
             rows.append(tuple(texts))
         return cls(caption, tuple(columns), tuple(rows), tuple(notes), frame)
 

@@ -117,8 +117,8 @@ class PoseScorer:
         equal = np.zeros((len(steps), len(self._blocks)), dtype=bool)
         for place, step in enumerate(steps):
             equal[place, list(self.goal.equal_to[step.candidate])] = True
-        alike = tuple(symmetries(block_type) for block_type in types)
-        alignment = Alignment(poses, self._poses, equal, alike)
+        turns = tuple(symmetries(block_type) for block_type in types)
+        alignment = Alignment(poses, self._poses, equal, turns)
         numbers = [step.candidate for step in steps]
         absolute = self._scored("absolute", numbers, types, alignment, Motion())
         aligned: PoseScore | None = None

@@ -151,8 +151,8 @@ def placed_counts(
     attribute = "look" if setting == "A" else "kind"
     standing = list(chosen)
     for block in (scene.blocks[vertex] for vertex in fallen):
-        alike = [n for n in standing if candidates[n].look == block.look]
-        standing.remove((alike or [n for n in standing if candidates[n].kind == block.kind])[-1])
+        matching = [n for n in standing if candidates[n].look == block.look]
+        standing.remove((matching or [n for n in standing if candidates[n].kind == block.kind])[-1])
     wanted = Counter(getattr(block, attribute) for block in scene.blocks)
     have = Counter(getattr(candidates[index], attribute) for index in standing)
     tp = sum((wanted & have).values())

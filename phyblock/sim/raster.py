@@ -360,10 +360,10 @@ class _LightMap:
         planes = self._planes_of(backs)
         covering = _spans(self.places(backs.corners_m)[..., :2], size_px)
         shown, _ = _nearest(covering, planes, size_px, -np.inf, np.inf)
-        alike = np.ones(shown.shape, dtype=np.bool_)
-        alike[:-1, :-1] = shown[:-1, :-1] == shown[1:, 1:]
-        alike[:-1, :-1] &= (shown[:-1, :-1] == shown[:-1, 1:]) & (shown[:-1, :-1] == shown[1:, :-1])
-        self._shown, self._alike = shown.ravel(), alike.ravel()
+        same = np.ones(shown.shape, dtype=np.bool_)
+        same[:-1, :-1] = shown[:-1, :-1] == shown[1:, 1:]
+        same[:-1, :-1] &= (shown[:-1, :-1] == shown[:-1, 1:]) & (shown[:-1, :-1] == shown[1:, :-1])
+        self._shown, self._same = shown.ravel(), same.ravel()
         # Empty pixels cast no shadow.
         self._planes = np.vstack([planes, [0.0, 0.0, -np.inf]]).T.copy()
 
@@ -392,7 +392,7 @@ class _LightMap:
         left, top = np.floor(column), np.floor(row)
         pixel = (top * self._size_px + left).astype(np.int64)
         lit = self._is_before(pixel, column, row, height).astype(np.float64)
-        mixed = np.flatnonzero(~self._alike[pixel])
+        mixed = np.flatnonzero(~self._same[pixel])
         pixel, column, row, height = pixel[mixed], column[mixed], row[mixed], height[mixed]
         across, down = column - left[mixed], row - top[mixed]
         share = np.zeros(len(mixed))

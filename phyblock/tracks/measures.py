@@ -77,7 +77,7 @@ class SampleCounts:
     means that the sample is not counted. `cells` replace those of the track.
 
     With `parts`, the samples of one group, such as the rotations of a question, count as one, which
-    is right only if all `parts` are. `alike` names fields of `run.yaml` that affect the counts:
+    is right only if all `parts` are. `same` names fields of `run.yaml` that affect the counts:
     runs that differ in one cannot be compared.
     """
 
@@ -88,7 +88,7 @@ class SampleCounts:
     score: Callable[[Any], Sequence[float] | None] | None = None
     cells: tuple[Cell, ...] = ()
     parts: Callable[[Suite], int] | None = None
-    alike: tuple[str, ...] = ()
+    same: tuple[str, ...] = ()
 
     def of(self, record: Record) -> Iterator[tuple[Way, Sequence[float]]]:
         """Yield the counts of a record with the way in which each was scored."""
@@ -258,9 +258,9 @@ def read_report(
     the `mean_of` others of its counts, or the `difference_of` two. `code` has those fields of
     measures, by name, that are functions.
     """
-    told = read_own_yaml(Path(__file__).with_name(f"{track}.yaml"))
+    declared = read_own_yaml(Path(__file__).with_name(f"{track}.yaml"))
     by_name, measures = {counted.name: counted for counted in counts}, dict[str, Measure]()
-    for group in told.pop("measures"):
+    for group in declared.pop("measures"):
         for name, own in group.pop("of").items():
             about = {**group, **own, **(code or {}).get(name, {})}
             counted, is_mean = by_name[about.pop("counts")], about.pop("mean", False)
@@ -278,12 +278,12 @@ def read_report(
                 by = mean_of if is_mean else ratio_of
                 value = _divided(by, counted.columns, part, whole)
             measures[name] = Measure(name, counted=counted, value=value, **about)
-    told["headline"] = tuple(LayoutColumn(**column) for column in told["headline"])
-    told["tables"] = {
+    declared["headline"] = tuple(LayoutColumn(**column) for column in declared["headline"])
+    declared["tables"] = {
         name: Layout(**{**one, "columns": [LayoutColumn(**column) for column in one["columns"]]})
-        for name, one in told["tables"].items()
+        for name, one in declared["tables"].items()
     }
-    return TrackReport(tuple(measures.values()), **told, **more)
+    return TrackReport(tuple(measures.values()), **declared, **more)
 
 
 def _divided(by: Metric, columns: Sequence[str], *named: Sequence[str]) -> Metric:

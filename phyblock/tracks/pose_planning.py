@@ -460,7 +460,7 @@ def _plan(setting: Setting) -> SampleCounts:
     return SampleCounts(f"plan_{setting.lower()}", ("tp", "fp", "fn"), record=of)
 
 
-_ALIKE = tuple(f"tracks.pose_planning.{key}" for key in (CARRYING, ENGINE))
+_SAME = tuple(f"tracks.pose_planning.{key}" for key in (CARRYING, ENGINE))
 _FITS = ("position_cm", "turn_deg", "iou")
 _WHOLE_COUNTS = ("steps", "reached", "blocks", "iou", "completed", "plans")
 _RIGHT = tuple(f"{frame}_{cm:g}" for frame in POSE_FRAMES for cm in TOLERANCES_CM)
@@ -468,7 +468,7 @@ FITS = SampleCounts("fits", (*_FITS, "n"), record=_fits)
 COUNTS = (
     SampleCounts("poses", (*_RIGHT, "steps", "blocks"), record=_right),
     FITS,
-    SampleCounts("carried", (*STEP_ENDS, *POSE_ERRORS, *_WHOLE_COUNTS), record=_ends, alike=_ALIKE),
+    SampleCounts("carried", (*STEP_ENDS, *POSE_ERRORS, *_WHOLE_COUNTS), record=_ends, same=_SAME),
     _plan("A"),
     _plan("B"),
 )
@@ -493,8 +493,8 @@ def _film(record: PoseRecord, task: AssemblyTask | None) -> Iterator[FilmStep]:
         caption = f"{n}. block {given.block}: {(step.error or step.end).replace('_', ' ')}"
         yield FilmStep(caption, tone, given.block, tuple(world.values()))
     tone = "good" if record.pose.completed else "bad"
-    told = f"{record.pose.reached} of {record.n_blocks} blocks reached"
-    yield FilmStep(told, tone, None, tuple(world.values()))
+    summary = f"{record.pose.reached} of {record.n_blocks} blocks reached"
+    yield FilmStep(summary, tone, None, tuple(world.values()))
 
 
 class PosePlanning(SceneTrack):

@@ -216,7 +216,7 @@ def _letters(record: ChoiceRecord) -> tuple[int, ...] | None:
     return (*(getattr(answer, kind) == letter for kind, letter in _LETTER_COUNTS), 1)
 
 
-_ALIKE = ("suite.vqa.circular", "tracks.vqa.questions")
+_SAME = ("suite.vqa.circular", "tracks.vqa.questions")
 _COLUMNS = tuple(f"{kind}_{letter.lower()}" for kind, letter in _LETTER_COUNTS)
 COUNTS = (
     SampleCounts(
@@ -224,10 +224,10 @@ COUNTS = (
         ("correct", "n"),
         record=_answer,
         parts=lambda suite: suite.section(VqaSpec).rotations,
-        alike=_ALIKE,
+        same=_SAME,
     ),
-    SampleCounts("rotations", ("correct", "n"), record=_answer, alike=_ALIKE),
-    SampleCounts("letters", (*_COLUMNS, "n"), record=_letters, cells=(WHOLE,), alike=_ALIKE),
+    SampleCounts("rotations", ("correct", "n"), record=_answer, same=_SAME),
+    SampleCounts("letters", (*_COLUMNS, "n"), record=_letters, cells=(WHOLE,), same=_SAME),
 )
 
 

@@ -281,7 +281,7 @@ _LIKELY = PastStep("Move(1)", "placed", 1)
 
 STEP_OUTCOMES = ("placed", *ERROR_TYPES, "invalid", "unread", "done")
 """Outcomes of steps in tables; `unread` are replies without a single parsed operation."""
-_ALIKE = (f"tracks.step_planning.{ENGINE}",)
+_SAME = (f"tracks.step_planning.{ENGINE}",)
 
 
 def _episodes(record: EpisodeRecord) -> tuple[int, ...]:
@@ -298,7 +298,7 @@ COUNTS = (
         "moves",
         ("tp", "fp", "fn"),
         score=lambda score: (score.tp, score.fp, score.fn),
-        alike=_ALIKE,
+        same=_SAME,
     ),
     SampleCounts(
         "episodes",
@@ -308,7 +308,7 @@ COUNTS = (
             *(f"step_{name}" for name in STEP_OUTCOMES),
         ),
         record=_episodes,
-        alike=_ALIKE,
+        same=_SAME,
     ),
     POSE_COUNTS,
 )
@@ -410,7 +410,7 @@ class StepPlanning(SceneTrack):
     ) -> tuple[Message, ...]:
         """Return the messages of the step after `past`, whose history they contain as text."""
         assert isinstance(self.prompt, TemplatePrompt)
-        spec, told = self.spec, [one.report(self.spec.feedback) for one in past]
+        spec, reports = self.spec, [one.report(self.spec.feedback) for one in past]
         facts: dict[str, object] = {
             **self.facts(item, pictures),
             "step": len(past) + 1,
@@ -418,10 +418,10 @@ class StepPlanning(SceneTrack):
             "cot": spec.cot,
             "gating": spec.gating,
             "setting": self.accepts,
-            "told": told[-1] if told else "",
+            "told": reports[-1] if reports else "",
             "history": [
                 {"step": number, "operation": one.operation, "told": report}
-                for number, (one, report) in enumerate(zip(past, told, strict=True), 1)
+                for number, (one, report) in enumerate(zip(past, reports, strict=True), 1)
             ],
         }
         return self.prompt.messages(

@@ -127,13 +127,13 @@ def entries_of(runs: Sequence[SiteRun]) -> tuple[Entry, ...]:
     for number, one in enumerate(runs):
         # A run has the same row as a folder and as a bundle.
         for model in portable_manifest(one.run.manifest).models:
-            told = {name: value for name, value in model.fields().items() if name not in _LABELS}
+            fields = {name: value for name, value in model.fields().items() if name not in _LABELS}
             for known, entry in found:
-                if known == told and not set(one.tracks) & set(entry.runs):
+                if known == fields and not set(one.tracks) & set(entry.runs):
                     break
             else:
                 entry = Entry(model)
-                found.append((told, entry))
+                found.append((fields, entry))
             entry.runs |= dict.fromkeys(one.tracks, number)
     entries = tuple(entry for _, entry in found)
     names = [entry.model.name for entry in entries]
@@ -306,9 +306,9 @@ def shortfalls(run: Run, track: str) -> Mapping[str, str]:
     """Return, for each model that lacks replies in a track, their number and the reason."""
     table, stopped = coverage_frame(run), read_stopped(run.path).models
     failed = run.records[run.records["error_kind"].notna() & (run.records["track"] == track)]
-    told = failed[["model", "error_kind", "error_status", "error_message"]]
+    causes = failed[["model", "error_kind", "error_status", "error_message"]]
     reasons: dict[str, Counter[str]] = {}
-    for model, kind, status, message in zip(*(told[name] for name in told), strict=True):
+    for model, kind, status, message in zip(*(causes[name] for name in causes), strict=True):
         text = str(message or kind)
         if not pd.isna(status) and str(status) not in text:
             text = f"HTTP {status}: {text}"

@@ -14,7 +14,7 @@ from phyblock.domain.scene import AssemblyTask
 from phyblock.errors import SpecError
 from phyblock.records.files import read_records
 from phyblock.records.record import Record
-from phyblock.results.compare import check_alike, comparable
+from phyblock.results.compare import check_pair, comparable
 from phyblock.results.estimates import Headline
 from phyblock.results.load import load_run
 from phyblock.results.text import number
@@ -124,7 +124,7 @@ class Ending:
             if track not in other.design.suite.tracks:
                 continue
             try:
-                check_alike(other, self._run, [part.cell], track, what.measure)
+                check_pair(other, self._run, [part.cell], track, what.measure)
             except SpecError as error:
                 self._notes.append(f"Left out, as it cannot be compared: {one_line(str(error))}")
                 continue

@@ -73,19 +73,19 @@ def write_site(
     _check_place(folder)
     with ExitStack() as kept:
         runs = open_runs(paths, data, kept)
-        check_runs_alike(runs)
+        check_runs(runs)
         entries = entries_of(runs)
         board = board_of(runs, entries) | {"title": title, "about": _ABOUT}
         finding = board["tracks"][0]["finding"]
-        told = []
+        built_from = []
         for one in runs:
             # The manifest of a bundle names this machine's data.
             manifest = digest_of_file(one.run.path / MANIFEST)
             is_verified = one.unverified is not None
             known = one.run.manifest.identity if is_verified else manifest
             records = digest_of_file(one.run.path / RECORDS)
-            told.append([known, records, is_verified, bool(one.sources.lacking)])
-        build = build_of(title, told)
+            built_from.append([known, records, is_verified, bool(one.sources.lacking)])
+        build = build_of(title, built_from)
         facts = {"title": title, "description": f"{_ABOUT} {finding}".strip(), "board": board}
         facts["image"] = f"{_DATA}{build}/card.png"
         made = SiteWritten(out / INDEX, len(entries))
@@ -153,7 +153,7 @@ def open_runs(paths: Sequence[Path], data: Sequence[Path], kept: ExitStack) -> t
     return tuple(opened)
 
 
-def check_runs_alike(runs: Sequence[SiteRun]) -> None:
+def check_runs(runs: Sequence[SiteRun]) -> None:
     """Raise SpecError naming all differences between a run and an earlier one that keep them from
     sharing a table.
 
@@ -164,11 +164,11 @@ def check_runs_alike(runs: Sequence[SiteRun]) -> None:
     for number, one in enumerate(runs):
         for first in runs[:number]:
             shared = [track for track in one.tracks if track in first.tracks]
-            told, wanted = (_facts(side.run, shared) for side in (one, first))
+            found, wanted = (_facts(side.run, shared) for side in (one, first))
             message = f"cannot share a table with {first.where}"
             differences = [
                 Problem(one.where, message, name, str(value), str(other), hint)
-                for name, value in told.items()
+                for name, value in found.items()
                 # The prompt of a recording is unknown, and a baseline has none.
                 if None not in (value, other := wanted.get(name)) and value != other
                 for hint in [_HINTS.get(name.rpartition(".")[2], "make a site of each")]

@@ -61,7 +61,7 @@ _OF_QUESTION = ("subtask", "text", "options", "answer_letters", "pictures", "evi
 _LONGEST = {"text": 6000, "reasoning": 2000}
 """Characters of a reply that a site shows; the bundle has all of it."""
 _CARD_PX = (1200, 630)
-_TELLING_BLOCKS = 6
+_INSTRUCTIVE_BLOCKS = 6
 """A failure is most instructive if its goal has about this many blocks."""
 
 
@@ -130,9 +130,9 @@ def _write_three(folder: Path) -> None:
     (folder / "three.js").write_text(script, encoding="utf-8")
 
 
-def build_of(*told: object) -> str:
+def build_of(*contents: object) -> str:
     """Return a name for the content of a page: the same runs always have the same files."""
-    return hex_digest(json.dumps([_LAYOUT, version("phyblock"), *told]))[:12]
+    return hex_digest(json.dumps([_LAYOUT, version("phyblock"), *contents]))[:12]
 
 
 def pack_samples(
@@ -183,8 +183,8 @@ def pack_samples(
                 asked = opener(record) if (opener := one.sources.items.get(track)) else None
                 question = -1
                 if asked:
-                    told = {name: _plain(getattr(asked.question, name)) for name in _OF_QUESTION}
-                    question = packs["questions"].add(told)
+                    fields = {name: _plain(getattr(asked.question, name)) for name in _OF_QUESTION}
+                    question = packs["questions"].add(fields)
                 about = (tracks[track], item, scenes[record.scene], record.levels)
                 items.append((*about, record.part, question))
             worth = one.values[track].samples.get(record.model, {})
@@ -206,8 +206,8 @@ def pack_samples(
             first = next((n for n, why in enumerate(wrong) if why), 0)
             # It goes well for some steps first.
             if first >= 2 and record.scene in one.sources.tasks and record.model not in rules:
-                tells = min(first, 4) - abs(record.n_blocks - _TELLING_BLOCKS)
-                found.append(_Failure(str(wrong[first]), record.model, tells, len(rows) - 1))
+                weight = min(first, 4) - abs(record.n_blocks - _INSTRUCTIVE_BLOCKS)
+                found.append(_Failure(str(wrong[first]), record.model, weight, len(rows) - 1))
             packs["records"].add(_entry(record, design.matcher, prompts, sent, is_cut))
     is_drawn = False
     for scene in scenes:
@@ -234,7 +234,7 @@ def pack_samples(
         "rows": _columns("entry item seed way outcome score wrong", rows),
         "starts": {**starts_of, "scenes": starts_of["scenes"] if is_drawn else []},
         "lacking": "" if is_drawn else runs[0].sources.lacking,
-        "telling": _telling(found, failures),
+        "telling": _instructive(found, failures),
         "kit": {"shapes": shapes, "colors": COLOR_RGB},
     }
     _write(folder, "samples", build, _to_json(index))
@@ -279,8 +279,8 @@ def _entry(
     if record.asked_turns:
         turns = zip(fields["turns"], record.asked_turns, strict=True)
         entry["turns"] = [
-            {**told, "reply": reply(told["reply"]), "prompt": None, **prompt(turn.prompt)}
-            for told, turn in turns
+            {**stored, "reply": reply(stored["reply"]), "prompt": None, **prompt(turn.prompt)}
+            for stored, turn in turns
         ]
     if record.reply is not None:
         # An episode's replies are in its turns.
@@ -299,17 +299,17 @@ class _Failure(NamedTuple):
 
     error: str
     model: str
-    tells: float
+    weight: float
     row: int
 
 
-def _telling(found: list[_Failure], most: int) -> list[int]:
+def _instructive(found: list[_Failure], most: int) -> list[int]:
     """Return rows of the most instructive samples, of all types of error and many models."""
     chosen: list[_Failure] = []
 
     def order(one: _Failure) -> tuple[int, int, float, int]:
         errors, models = ([other[n] for other in chosen] for n in (0, 1))
-        return errors.count(one.error), models.count(one.model), -one.tells, one.row
+        return errors.count(one.error), models.count(one.model), -one.weight, one.row
 
     while len(chosen) < min(most, len(found)):
         chosen.append(min((one for one in found if one not in chosen), key=order))

@@ -30,10 +30,10 @@ _MOST_NAMED = 6
 
 def cautions(run: Run) -> tuple[str, ...]:
     """Return warnings to read before any number, most important first; () for a complete run."""
-    table, stopped, told = coverage_frame(run), read_stopped(run.path), []
+    table, stopped, sentences = coverage_frame(run), read_stopped(run.path), []
     expected, recorded = int(table["expected"].sum()), int(table["recorded"].sum())
     if recorded < expected:
-        told.append(
+        sentences.append(
             f"This run is not finished: {recorded:,} of {expected:,} samples have a record."
         )
     tracks = run.design.suite.tracks
@@ -42,19 +42,19 @@ def cautions(run: Run) -> tuple[str, ...]:
         for track in tracks
         for model, said in shortfalls(run, track).items()
     ]
-    told += lacking[:_MOST_NAMED]
+    sentences += lacking[:_MOST_NAMED]
     if (rest := len(lacking) - _MOST_NAMED) > 0:
-        told.append(f"And {rest} more lack replies: see the table of coverage.")
+        sentences.append(f"And {rest} more lack replies: see the table of coverage.")
     if stopped.run:
-        told.append(f"The last session was stopped: {short(stopped.run)}.")
+        sentences.append(f"The last session was stopped: {short(stopped.run)}.")
     if run.is_cut:
-        told.append("The last line of records.jsonl was cut off and is ignored.")
+        sentences.append("The last line of records.jsonl was cut off and is ignored.")
     limit, items = run.manifest.limit, run.design.items
     if cut := [name for name in tracks if limit and items.get(name, 0) >= limit]:
         asked = [(items[name], kind_of(name)) for name in cut]
         counts = ", ".join(f"{n:,} {kind.item}s of {kind.title}" for n, kind in asked)
-        told.append(f"A limit was set: {counts} were asked about, not all of the suite.")
-    return tuple(told)
+        sentences.append(f"A limit was set: {counts} were asked about, not all of the suite.")
+    return tuple(sentences)
 
 
 def write_report(written: TablesWritten, data: Path | None = None) -> Path:

@@ -131,8 +131,8 @@ class _Handler(BaseHTTPRequestHandler):
             file, kind = _PAGE[name]
             self._send(200, kind, asset(file))
         elif name == "state" and (after := _STATE.fullmatch(query)):
-            told = session.state(int(after[1] or -1), _WAIT_S)
-            self._send(200, "application/json", json.dumps(told).encode())
+            state = session.state(int(after[1] or -1), _WAIT_S)
+            self._send(200, "application/json", json.dumps(state).encode())
         elif (at := _PICTURE.fullmatch(name)) and (
             shown := session.picture(*map(int, at.groups()))
         ):

@@ -202,7 +202,7 @@ class PlaySession:
         self._changed = threading.Condition()
         self._number = 0
         self._phase: Phase = "waiting"
-        self._told: Mapping[str, Any] = {}
+        self._details: Mapping[str, Any] = {}
         self._asked: _Asked | None = None
         self._is_exact = False
         self._ending: Ending | None = None
@@ -271,16 +271,16 @@ class PlaySession:
         """Return the state for a page; wait for a change after number `after`, up to `wait_s`."""
         with self._changed:
             self._changed.wait_for(lambda: self._number != after, wait_s)
-            told: dict[str, Any] = {"change": self._number, "phase": self._phase, **self._told}
+            state: dict[str, Any] = {"change": self._number, "phase": self._phase, **self._details}
             if self._asked is not None and self._phase == "question":
                 asked, now_s = self._asked, self._clock()
                 # The clock starts when the question is first sent.
                 asked.since_s = now_s if asked.since_s is None else asked.since_s
                 count = len(pictures_of(asked.request))
                 addresses = [f"picture/{self._number}/{n}" for n in range(count)]
-                told["question"] = shown(asked.request, asked.picking, asked.place, addresses)
-                told |= {"elapsed_s": asked.seen_s(now_s), "exact": self._is_exact}
-            return told
+                state["question"] = shown(asked.request, asked.picking, asked.place, addresses)
+                state |= {"elapsed_s": asked.seen_s(now_s), "exact": self._is_exact}
+            return state
 
     def picture(self, change: int, number: int) -> Image | None:
         """Return a picture of the current question; None for any other."""
@@ -350,7 +350,7 @@ class PlaySession:
         assert self._asked is not None
         return self._asked
 
-    def _go_to(self, phase: Phase, **told: Any) -> None:
-        self._phase, self._told = phase, told
+    def _go_to(self, phase: Phase, **details: Any) -> None:
+        self._phase, self._details = phase, details
         self._number += 1
         self._changed.notify_all()

@@ -194,7 +194,7 @@ def end_on_a_phone(page: Page, run: Path) -> None:
     page.get_by_role("button", name="Pause").tap()
     page.get_by_role("heading", name="Paused").wait_for()
     assert page.locator("img").count() == 0
-    page.get_by_role("button", name="Go on").tap()
+    page.get_by_role("button", name="Continue").tap()
     page.get_by_role("button", name="Submit 1 step").tap()
     for number in range(4, 8):
         task(page, number)

@@ -1,4 +1,4 @@
-"""`phyblock scenes`: make data sets, check them, look at them."""
+"""`phyblock scenes`: make, check and show data sets."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ from phyblock.workers import open_workers
 
 @click.group("scenes")
 def scenes() -> None:
-    """Make data sets of scenes, check them against physics, and look at them."""
+    """Make data sets of scenes, check them by physics, and show them."""
 
 
 _LEVELS = ("1", "2", "3", "4", "5+")
@@ -108,14 +108,14 @@ _LEVELS = ("1", "2", "3", "4", "5+")
     type=click.Choice(["kit", "full"]),
     default="kit",
     show_default=True,
-    help=f"The kit's {len(PALETTES['kit'])} pairs of type and color, or all that there are.",
+    help=f"The kit's {len(PALETTES['kit'])} pairs of type and color, or all pairs.",
 )
 @click.option(
     "--exclude",
     multiple=True,
     type=NAME_OR_PATH,
     metavar="SET",
-    help="Make no scene of this set either, in whatever colors.",
+    help="Also exclude the scenes of this set, in any colors.",
 )
 @making_options
 def generate(
@@ -131,8 +131,8 @@ def generate(
 ) -> None:
     """Make N scenes with candidate sets, each checked by physics, and their data card.
 
-    None is equal to a scene of the built-in set, or of a SET to exclude, but for colors, turning,
-    mirroring and shifting. The same N, seed, levels and palette give the same files with the same
+    None equals a scene of the built-in set, or of an excluded SET, even when recolored, turned,
+    mirrored or shifted. The same N, seed, levels and palette give the same files with the same
     physics engine, on any Python, any number of processes or a cluster.
     """
     settled = _settled(count, levels, palette, exclude)
@@ -159,7 +159,7 @@ def generate(
 
 
 def _settled(count: int, levels: Sequence[str], palette: str, exclude: Sequence[str]) -> str:
-    """Return arguments of generate in one form."""
+    """Return arguments of generate in canonical form."""
     text = f"--count {count} --levels {','.join(sorted(levels))} --palette {palette}"
     return text + "".join(f" --exclude {shlex.quote(name)}" for name in exclude)
 
@@ -167,14 +167,14 @@ def _settled(count: int, levels: Sequence[str], palette: str, exclude: Sequence[
 @scenes.command("commit")
 @click.argument("arguments", nargs=-1, metavar="-- [ARGUMENT]...")
 @click.option(
-    "--public", required=True, metavar="TEXT", help="The later public value that counts, in words."
+    "--public", required=True, metavar="TEXT", help="The later public value to use, in words."
 )
 @click.option("--out", "-o", type=UserPath(), required=True, metavar="DIR", help="Folder to write.")
 def commit(arguments: tuple[str, ...], public: str, out: Path) -> None:
     """Commit to a set, by ARGUMENTS of generate, whose seed nobody can choose or know yet.
 
     Writes DIR/secret.txt, to be kept, and DIR/commitment.json, to be published: digests of the
-    secret, of phyblock's code and of the built-in scenes, and which later public value counts.
+    secret, of phyblock's code and of the built-in scenes, and the later public value to use.
     """
     settled = season_arguments(arguments)
     files = (out / "secret.txt", out / "commitment.json")
@@ -202,7 +202,7 @@ def commit(arguments: tuple[str, ...], public: str, out: Path) -> None:
 def reveal(commitment: Path, secret: Path, public: str) -> None:
     """Print the command that makes the set of a COMMITMENT, once its SECRET is revealed.
 
-    Refuses another secret, other code, or another physics engine than was committed to.
+    Refuses another secret, code or physics engine than was committed to.
     """
     meant = decode(TypeAdapter(Commitment), read_data(commitment), str(commitment), Commitment)
     revealed = read_data(secret).decode("ascii", "replace").strip()
@@ -212,8 +212,8 @@ def reveal(commitment: Path, secret: Path, public: str) -> None:
 
 
 def season_arguments(words: Sequence[str]) -> str:
-    """Return arguments of generate in one form; UsageError where they name a seed, a folder, or a
-    set that its maker could still change.
+    """Return arguments of generate in canonical form. Raises UsageError if they name a seed, a
+    folder, or a set that its maker could still change.
     """
     context = generate.make_context("generate", ["--out", ".", *words])
     given = context.params
@@ -232,10 +232,10 @@ def season_arguments(words: Sequence[str]) -> str:
 @click.argument("first", metavar="A", type=NAME_OR_PATH)
 @click.argument("second", metavar="B", type=NAME_OR_PATH)
 def compare(first: str, second: str) -> None:
-    """List the scenes of the data set A that B holds too, whatever their colors.
+    """List the scenes of the data set A that B also holds, in any colors.
 
-    Scenes are equal when turning, mirroring and shifting makes one the other, and nearly equal
-    when colors alone differ then.
+    Scenes are equal if turning, mirroring and shifting makes one the other, and nearly equal if
+    then only colors differ.
     """
     equal: dict[bytes, str] = {}
     nearly: dict[bytes, str] = {}
@@ -264,10 +264,9 @@ def compare(first: str, second: str) -> None:
 def complete_set(data: Path, jobs: int, out: Path | None) -> None:
     """Make a data set from scenes that give type, color, position and euler of their blocks.
 
-    FILE_OR_FOLDER is YAML, JSON, or JSON with a scene a line, or a folder of such files.
+    FILE_OR_FOLDER is YAML, JSON, or JSON with one scene per line, or a folder of such files.
     Derives dependencies from contacts, and layers and levels from those; draws candidates unless
-    they are given. Refuses scenes whose blocks overlap, float or fall. Never writes over what was
-    given.
+    they are given. Refuses scenes whose blocks overlap, float or fall. Never overwrites its input.
     """
     given = read_given(data)
     folder = out or Path(f"{data.resolve().stem}-set")
@@ -304,7 +303,7 @@ def _completed(read: ReadScene) -> Completed | tuple[Problem, ...]:
 @click.argument("data", metavar="[PATH]", default="phyblock-400", type=NAME_OR_PATH)
 @jobs_option()
 def verify(data: str, jobs: int) -> None:
-    """Check every scene of PATH against geometry and physics, down to the last number.
+    """Check every number of every scene of PATH by geometry and physics.
 
     PATH is a folder with scenes.jsonl or a bundled set, by default the built-in phyblock-400.
     To check data sets made elsewhere, use: phyblock scenes audit.
@@ -328,14 +327,14 @@ def verify(data: str, jobs: int) -> None:
 
 
 def _counts(found: Sequence[Finding], checks: Sequence[str]) -> list[tuple[str, int, int]]:
-    """Each check with the number of scenes that it found something in, and of findings."""
+    """Return each check with the numbers of scenes with findings, and of findings."""
     scenes = Counter(check for _, check in {(one.scene, one.check) for one in found})
     findings = Counter(one.check for one in found)
     return [(check, scenes[check], findings[check]) for check in checks]
 
 
 _WORST = 15
-"""The worst scenes of an audit that are shown."""
+"""Maximum number of scenes that an audit shows."""
 
 
 @scenes.command("audit")
@@ -362,7 +361,7 @@ def audit(data: str, table: Path | None, jobs: int) -> None:
     console = make_console()
 
     def badness(scene: Scene) -> tuple[float, int]:
-        """The farthest fall, or the largest overlap or gap, then the number of findings."""
+        """Return the farthest fall, or the largest overlap or gap, then the number of findings."""
         some = found[scene.id]
         return max(finding.value_mm or 0.0 for finding in some), len(some)
 
@@ -406,8 +405,8 @@ def audit(data: str, table: Path | None, jobs: int) -> None:
 def show(data: str, scene: str) -> None:
     """Show the facts of SCENE in the data set PATH: blocks, layers, dependencies, candidates.
 
-    "on" names the blocks below, "pick" the candidate that stands for the block, "seen" the share
-    of it that no other hides in the default goal picture.
+    "on" names the blocks below, "pick" the candidate for the block, "seen" the share of it that is
+    visible in the default goal picture.
     """
     task = read_data_set(data).task(scene)
     shown, offered = task.scene, task.candidates
@@ -473,7 +472,7 @@ def render(
 ) -> None:
     """Draw the scenes SCENE... of the data set PATH, or all of them, at 512 by 512 pixels.
 
-    Files are named SCENE-VIEW-BACKGROUND; it writes over those that it wrote before.
+    Files are named SCENE-VIEW-BACKGROUND; earlier ones of this command are overwritten.
     """
     read = read_data_set(data)
     views = [name for name in VIEWS if view in (name, "all")]

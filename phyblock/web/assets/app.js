@@ -63,7 +63,7 @@ const App = (() => {
     shown = root.dataset.shown = view;
     place.className = view === "samples" ? "" : "site";
     warning.hidden = !unknown.length;
-    warning.textContent = `There is nothing here that the link names so: ${unknown.join("; ")}.`;
+    warning.textContent = `The link names something that is not here: ${unknown.join("; ")}.`;
     for (const link of document.querySelectorAll(".top nav a")) {
       if (link.hash === `#${view}`) link.setAttribute("aria-current", "page");
       else link.removeAttribute("aria-current");

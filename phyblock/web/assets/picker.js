@@ -34,7 +34,7 @@ const Picker = (() => {
     const chips = el("ol", { class: "chips", "aria-label": isOne ? "Your answer" : "Your answer so far" });
     const typing = el("span", { class: "muted number" });
     const button = (text, act) => el("button", { type: "button", class: "quiet", onclick: act }, text);
-    const [undo, clear] = [button("Undo", takeBack), button("Clear", () => change("All taken back", (all) => all.splice(0)))];
+    const [undo, clear] = [button("Undo", takeBack), button("Clear", () => change("All removed", (all) => all.splice(0)))];
     const done = el("button", { type: "submit" });
     // Beside number fields there is room for those alone that no picture shows.
     const buttons = choices.map((one, place) => (one.spots.length && (hasFields || choices.length > MOST_BUTTONS) ? null

@@ -37,9 +37,9 @@
           ? `Welcome back. ${Words.count(left, "task")} of ${about.of} ${left === 1 ? "is" : "are"} left.`
           : `${Words.count(about.of, "task")} for ${about.name}.`),
         el("ul", {}, [
-          "You see the pictures that models are sent. Their exact prompt is one click away; the written form that it asks for is made from your clicks.",
-          "Click a numbered block or an option to pick it. Where places are asked for as well, type the numbers. All can be undone until you submit; then it is kept, and the next task comes.",
-          "Without a mouse: type the number or letter (Enter where a longer number might follow), Backspace takes back, Ctrl+Enter submits.",
+          "You see the pictures that models get. Their exact prompt is one click away; your clicks are turned into the written answer that it asks for.",
+          "Click a numbered block or an option to pick it. If the task also asks for places, type the numbers. You can undo everything until you submit; then your answer is kept, and the next task follows.",
+          "Without a mouse: type the number or letter (then Enter if it could be the start of a longer one), Backspace undoes, Ctrl+Enter submits.",
           "Your answers and the time that each takes are written to a file on this computer; nothing goes over the network. Pause stops the clock and hides the task. Scores are shown at the end.",
         ].map((text) => el("li", {}, text))),
         button("Begin", () => post("begin")),
@@ -48,7 +48,7 @@
     warmed({ went }) {
       progress.textContent = "Warm-up";
       card(el("h1", {}, "That was the warm-up"), given(went),
-        el("p", {}, "It does not count. From now on answers are kept, and how they went is shown at the end."), button("Begin", () => post("begin")));
+        el("p", {}, "It does not count. From now on answers are kept; you see the results at the end."), button("Begin", () => post("begin")));
     },
     waiting() {
       card(el("p", { class: "lead", role: "status" }, "One moment …"));
@@ -63,15 +63,15 @@
     },
     paused() {
       card(el("h1", {}, "Paused"),
-        el("p", {}, "The clock stands still. All that you submitted is kept; you may also close this page and go on another day."),
-        button("Go on", () => post("begin")));
+        el("p", {}, "The clock is stopped. Everything you submitted is kept; you may also close this page and continue another day."),
+        button("Continue", () => post("begin")));
     },
     closed() {
-      card(el("h1", {}, "The session was closed"), el("p", {}, "All that you submitted is kept."));
+      card(el("h1", {}, "The session was closed"), el("p", {}, "Everything you submitted is kept."));
     },
     lost() {
       card(el("h1", {}, "The program behind this page has stopped"),
-        el("p", {}, "All that you submitted is kept. Start it again with the same command, and open the address that it prints."));
+        el("p", {}, "Everything you submitted is kept. Start it again with the same command, and open the address that it prints."));
     },
     done({ results }) {
       progress.textContent = "Done";

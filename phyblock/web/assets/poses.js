@@ -110,7 +110,7 @@ const Poses = (() => {
   }
 
   function offOf(scene, outcome) {
-    if (outcome.vertex === null) return "It stands for no block of the goal.";
+    if (outcome.vertex === null) return "It matches no block of the goal.";
     const name = scene ? `its place ${Steps.placeOf(scene, outcome.vertex)}` : "its place in the goal";
     const turned = outcome.turn_deg >= 1 ? `, turned by ${outcome.turn_deg.toFixed(0)} degrees` : "";
     if (outcome.position_cm < 0.05) return `That is where ${name} is${turned}.`;
@@ -124,10 +124,10 @@ const Poses = (() => {
     return {
       no_block: "There is no such block.",
       under_floor: `Refused: it would be ${cm(outcome.overlap_cm)} under the floor.`,
-      overlaps: `Refused: it would share space with others, ${cm(outcome.overlap_cm)} deep.`,
-      falls: `Let go, it falls: it comes to lie ${cm(outcome.moved_cm)} from there.`,
-      knocks_over: `Let go, it knocks over what step${others.length > 1 ? "s" : ""} ${others.join(", ")} put.`,
-    }[outcome.end] || "Let go, it stands.";
+      overlaps: `Refused: it would overlap others by ${cm(outcome.overlap_cm)}.`,
+      falls: `When released, it falls and comes to rest ${cm(outcome.moved_cm)} from there.`,
+      knocks_over: `When released, it knocks over the block${others.length > 1 ? "s of steps" : " of step"} ${others.join(", ")}.`,
+    }[outcome.end] || "When released, it stands.";
   }
 
   /** Facts of a record in one line: [[name, value], ...]. */

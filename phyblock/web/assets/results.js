@@ -5,7 +5,7 @@
 const Results = (() => {
   const LOOP_MS = 900;
   const REST_MS = 2600;
-  const NOTE = "Intervals: jackknife over base scenes. Ranks are ranges: paired tests of every pair of models, corrected for their number (Holm). Baselines have no rank, nor have models that were not asked about every sample.";
+  const NOTE = "Intervals: jackknife over base scenes. Ranks are ranges: paired tests of every pair of models, corrected for their number (Holm). Baselines, and models that were not asked about every sample, have no rank.";
   const { number } = Words;
   let clock = null;
 

@@ -74,7 +74,7 @@ const Sample = (() => {
     if (outcome === "ok" && !record.parse?.plan && !record.turns) return null;
     const problem = record.parse?.problem ? `: ${Words.named(record.parse.problem)}` : "";
     const why = record.error ? record.error.message
-      : record.reply ? `Nothing could be read out of the reply${problem}.` : "There is no reply.";
+      : record.reply ? `Nothing could be parsed from the reply${problem}.` : "There is no reply.";
     return el("p", { class: "notice" }, why);
   }
 
@@ -244,8 +244,8 @@ const Sample = (() => {
     }
     if (record.prompt) return prompt(record.prompt);
     const why = Data.isSite ? "A leaderboard holds no prompts; the report of the run has them."
-      : { replay: `Nothing was sent in this run: the reply of ${entry.name} is a recording, and what it was made from is not in it.`,
-        baseline: `Nothing was sent: ${entry.name} is a rule, not a model.` }[entry.kind] || "Nothing was sent, or nothing of it was kept.";
+      : { replay: `Nothing was sent in this run: the reply of ${entry.name} is a recording without its prompt.`,
+        baseline: `Nothing was sent: ${entry.name} is a rule, not a model.` }[entry.kind] || "No prompt was sent, or it was not kept.";
     return el("p", { class: "notice" }, why);
   }
 
