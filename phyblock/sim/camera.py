@@ -52,9 +52,6 @@ class Window(NamedTuple):
         return Window(x - half_x, x + half_x, y - half_y, y + half_y)
 
 
-FULL_WINDOW = Window(-1.0, 1.0, -1.0, 1.0)
-
-
 @dataclass(frozen=True, eq=False)
 class Camera:
     """A perspective camera at `eye_m` (3,) [m]; `axes` rows right, up, forward (world)."""
@@ -105,7 +102,7 @@ def view_axes(azimuth_deg: float, elevation_deg: float) -> NDArray[np.float64]:
 def frame(
     points_m: NDArray[np.float64],
     axes: NDArray[np.float64],
-    window: Window = FULL_WINDOW,
+    window: Window,
     min_distance_m: float = 0.0,
     drawn_m: NDArray[np.float64] | None = None,
 ) -> Camera:

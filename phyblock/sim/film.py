@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from phyblock.domain.scene import Block, CandidateSet, Scene
@@ -46,11 +47,14 @@ def assembly_gif(scene: Scene, style: PictureStyle) -> bytes:
         raise DataError(Problem(scene.id, message, "order of blocks"))
     counts, shown = range(1, len(scene) + 1), (camera, style.background, style.size_px)
     images = [picture(scene.blocks[:n], *shown) for n in counts]
-    return _gif(images, _STEP_MS, _END_MS, images[-1])
+    return _gif(images, _STEP_MS, _END_MS)
 
 
-def _gif(images: Sequence[Image.Image], each_ms: int, last_ms: int, colorful: Image.Image) -> bytes:
+def _gif(images: Sequence[Image.Image], each_ms: int, last_ms: int) -> bytes:
     """An animated GIF of images with these durations [ms], which repeats."""
+    # The palette is made from frames of every tone: the first, the middle and the last ones.
+    chosen = np.concatenate([images[0], images[len(images) // 2], images[-1]])
+    colorful = Image.fromarray(chosen)
     palette = colorful.quantize(256, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
     images = [one.quantize(palette=palette, dither=Image.Dither.NONE) for one in images]
     buffer, times_ms = io.BytesIO(), [each_ms] * (len(images) - 1) + [last_ms]
@@ -104,11 +108,4 @@ def episode_images(
 
 def episode_gif(images: Sequence[Image.Image]) -> bytes:
     """Frames as an animated GIF that repeats forever, with a longer last frame."""
-    # The palette is made from frames of every tone: the first, the middle and the last ones.
-    chosen = [images[0], images[len(images) // 2], images[-1]]
-    width, height = images[0].size
-    step = height + max(2, round(height * _GAP))
-    sheet = Image.new("RGB", (width, 2 * step + height), "white")
-    for place, image in enumerate(chosen):
-        sheet.paste(image, (0, place * step))
-    return _gif(images, _FRAME_MS, _LAST_FRAME_MS, sheet)
+    return _gif(images, _FRAME_MS, _LAST_FRAME_MS)

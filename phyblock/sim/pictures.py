@@ -230,21 +230,15 @@ def candidates_png(candidates: CandidateSet, style: PictureStyle) -> bytes:
 def composite_png(goal: bytes, candidates: bytes) -> bytes:
     """PNG with the goal on the left and the candidates on the right of a narrow white gap."""
     with Image.open(io.BytesIO(goal)) as left, Image.open(io.BytesIO(candidates)) as right:
-        gap = gap_px(left.height)
-        joined = Image.new("RGB", (left.width + gap + right.width, left.height), "white")
+        joined = Image.new("RGB", joined_size_px(left.height), "white")
         joined.paste(left.convert("RGB"), (0, 0))
-        joined.paste(right.convert("RGB"), (left.width + gap, 0))
+        joined.paste(right.convert("RGB"), (joined.width - right.width, 0))
         return to_png(joined)
 
 
 def joined_size_px(side_px: int) -> tuple[int, int]:
     """Width and height of two squares side by side, as in the composite."""
-    return 2 * side_px + gap_px(side_px), side_px
-
-
-def gap_px(height_px: int) -> int:
-    """Width of the gap between pictures of this height on one sheet."""
-    return max(2, round(height_px * _GAP))
+    return 2 * side_px + max(2, round(side_px * _GAP)), side_px
 
 
 def to_png(image: Image.Image) -> bytes:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 import phyblock.sim
 from phyblock.domain.blocks import BLOCK_TYPES, quat_xyzw_to_matrix
 from phyblock.domain.scene import Block
-from phyblock.sim.camera import FULL_WINDOW, Camera, frame, view_axes
+from phyblock.sim.camera import Camera, Window, frame, view_axes
 from phyblock.sim.engine import Pose
 from phyblock.sim.geometry import drawn_mesh
 from phyblock.sim.pictures import COLOR_RGB, light_direction
@@ -57,7 +57,7 @@ def triangles_m(prop: Prop) -> NDArray[np.float64]:
 
 def camera_on(props: list[Prop], view: tuple[float, float]) -> Camera:
     corners = np.vstack([triangles_m(prop).reshape(-1, 3) for prop in props])
-    return frame(corners, view_axes(*view), FULL_WINDOW.scaled(0.85), 0.3)
+    return frame(corners, view_axes(*view), Window(-0.85, 0.85, -0.85, 0.85), 0.3)
 
 
 def light_of(camera: Camera) -> Light:
