@@ -13,7 +13,6 @@ import sys
 import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, closing
 from dataclasses import replace
 from itertools import chain, islice
 
@@ -25,8 +24,8 @@ from phyblock.files import bundled
 from phyblock.making.scenes.production import split_tasks
 from phyblock.sim.balance import prove
 from phyblock.sim.contact import bounds_m, drop_height_m
-from phyblock.sim.dynamics import Site, groups
-from phyblock.sim.engine import PHYSICS_VARIABLE, installed_engines, physics_engine
+from phyblock.sim.dynamics import groups, stands
+from phyblock.sim.engine import PHYSICS_VARIABLE, installed_engines
 
 States = Iterator[tuple[str, Sequence[Block]]]
 
@@ -86,27 +85,22 @@ def main() -> int:
     )
     counts: Counter[tuple[str, bool | None]] = Counter()
     quarrels = 0
-    with ExitStack() as stack:
-        sites = {}
-        for name in installed_engines():
-            os.environ[PHYSICS_VARIABLE] = name
-            sites[name] = stack.enter_context(closing(Site(engine=physics_engine())))
-        for kind, blocks in found:
-            for group in groups(blocks):
+    for kind, blocks in found:
+        for group in groups(blocks):
+            start = time.process_time()
+            proven = prove(group)
+            spent["statics"] += time.process_time() - start
+            verdict = None if proven is None else proven.stands
+            counts[kind, verdict] += 1
+            for name in installed_engines():
+                os.environ[PHYSICS_VARIABLE] = name
                 start = time.process_time()
-                proven = prove(group)
-                spent["statics"] += time.process_time() - start
-                verdict = None if proven is None else proven.stands
-                counts[kind, verdict] += 1
-                for name, site in sites.items():
-                    start = time.process_time()
-                    stands = site.stands(group)
-                    spent[name] += time.process_time() - start
-                    if verdict not in (None, stands):
-                        quarrels += 1
-                        print(
-                            f"{name}: {'stands' if stands else 'falls'}, proven otherwise: {group}"
-                        )
+                has_stood = stands(group)
+                spent[name] += time.process_time() - start
+                if verdict not in (None, has_stood):
+                    quarrels += 1
+                    end = "stands" if has_stood else "falls"
+                    print(f"{name}: {end}, proven otherwise: {group}")
     total = sum(counts.values())
     for kind in sorted({kind for kind, _ in counts}):
         of = [counts[kind, verdict] for verdict in (True, False, None)]

@@ -34,7 +34,14 @@ from phyblock.files import bundled
 from phyblock.models.request import Image as SentImage
 from phyblock.scoring.pose import blocks_reached
 from phyblock.scoring.steps import Assembly
-from phyblock.sim.dynamics import DEFAULT_TRIAL, ONE_SETTING, ExecutedStep, Executor, Settled, Site
+from phyblock.sim.dynamics import (
+    DEFAULT_TRIAL,
+    ONE_SETTING,
+    ExecutedStep,
+    Executor,
+    Settled,
+    settle,
+)
 from phyblock.sim.geometry import center_cm, put
 from phyblock.sim.pictures import (
     LARGEST_PX,
@@ -93,7 +100,7 @@ class _BlockPlay:
         self.action_space = spaces.Discrete(MAX_CANDIDATES + 1)
         self._style, self._setting, self._gating = style, setting, gating
         self._physics, self._is_strict = physics, physics == "strict"
-        self._site = Site(DEFAULT_TRIAL if self._is_strict else ONE_SETTING)
+        self._trial = DEFAULT_TRIAL if self._is_strict else ONE_SETTING
         self._task: AssemblyTask | None = None
 
     def begin(self, task: AssemblyTask) -> None:
@@ -117,7 +124,7 @@ class _BlockPlay:
             state = tuple(self._scene.blocks[vertex] for vertex in self._assembly.vertices)
             self._settled = Settled((), state)
             if self._physics != "off":
-                settled = self._site.settle(state)
+                settled = settle(state, self._trial)
                 # Blocks that fall are held at their goal poses, or stay fallen under `strict`.
                 lying = settled.blocks if self._is_strict else state
                 self._settled = Settled(settled.fallen, lying)
@@ -156,7 +163,7 @@ class _BlockPlay:
         }
 
     def close(self) -> None:
-        self._site.close()
+        """Release nothing, since all environments share their worlds."""
 
 
 class _PosePlay:

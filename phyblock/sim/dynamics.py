@@ -9,6 +9,7 @@ rest (`moments`), since an unsupported load of .2 % of a block's weight would sh
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import functools
 import threading
@@ -191,7 +192,9 @@ def _placed(world: World, blocks: Sequence[Block]) -> Iterator[None]:
 
 _KEPT = 65_536  # Cached arrangements and states, about 1 kB each.
 _PLACE_DIGITS = 6
-_ONE_AT_A_TIME = threading.Lock()
+_ONE_AT_A_TIME = threading.RLock()
+_OPEN = contextlib.ExitStack()
+atexit.register(_OPEN.close)
 
 
 class Settled(NamedTuple):
@@ -206,60 +209,55 @@ class Settled(NamedTuple):
         return not self.fallen
 
 
-class Site:
-    """Open worlds in which each arrangement of a group is tried only once.
+def settle(blocks: Sequence[Block], trial: Trial = DEFAULT_TRIAL) -> Settled:
+    """Release blocks at their goal poses; they fall if they do under any setting.
 
-    Every block is tried at its goal pose, so that a verdict does not depend on earlier trials.
+    Each arrangement of a group is tried once, and a verdict does not depend on earlier trials. For
+    any thread.
     """
+    with _ONE_AT_A_TIME:
+        return _settled(tuple(blocks), trial, physics_engine())
 
-    def __init__(self, trial: Trial = DEFAULT_TRIAL, engine: PhysicsEngine | None = None) -> None:
-        self.trial = trial
-        self._engine = engine or physics_engine()
-        self._stack = contextlib.ExitStack()
-        self._worlds: dict[Physics, World] = {}
-        self._known = functools.lru_cache(_KEPT)(self._settle)
-        self._stands = functools.lru_cache(_KEPT)(self._stay)
 
-    def close(self) -> None:
-        """Release the worlds; the next trial opens new ones."""
-        self._worlds.clear()
-        self._stack.close()
+def stands(blocks: Sequence[Block], trial: Trial = DEFAULT_TRIAL) -> bool:
+    """True if all stay where they are under every setting; for any thread, as `settle`."""
+    with _ONE_AT_A_TIME:
+        engine = physics_engine()
+        return all(_stays(_arrangement(group), trial, engine) for group in groups(blocks))
 
-    def settle(self, blocks: Sequence[Block]) -> Settled:
-        """Release blocks at their goal poses; they fall if they do under any setting."""
-        return self._known(tuple(blocks))
 
-    def stands(self, blocks: Sequence[Block]) -> bool:
-        """True if all stay where they are under every setting."""
-        return all(self._stands(_arrangement(group)) for group in groups(blocks))
+@functools.lru_cache(maxsize=_KEPT)
+def _settled(blocks: tuple[Block, ...], trial: Trial, engine: PhysicsEngine) -> Settled:
+    if stands(blocks, trial):
+        return Settled((), blocks)
+    fallen, shown = set[int](), tuple[Block, ...]()
+    for physics in trial.physics:
+        # A new world: how blocks tumble could depend on earlier contents of a used one.
+        with World(physics, engine) as world:
+            world.place(*blocks)
+            wait(world, trial.duration_s)
+            moved = movement(blocks, world.poses(), trial).fallen
+            if moved:
+                wait(world, _COLLAPSE_S)
+                poses = world.poses()
+                moved += movement(blocks, poses, trial).fallen
+                lying = (poses[b.order].put(b) if b.order in moved else b for b in blocks)
+                shown = shown or tuple(lying)
+        fallen.update(moved)
+    return Settled(tuple(sorted(fallen)), shown or blocks)
 
-    def _settle(self, blocks: tuple[Block, ...]) -> Settled:
-        if self.stands(blocks):
-            return Settled((), blocks)
-        fallen, shown = set[int](), tuple[Block, ...]()
-        for physics in self.trial.physics:
-            # A new world: how blocks tumble could depend on earlier contents of a used one.
-            with World(physics, self._engine) as world:
-                world.place(*blocks)
-                wait(world, self.trial.duration_s)
-                moved = movement(blocks, world.poses(), self.trial).fallen
-                if moved:
-                    wait(world, _COLLAPSE_S)
-                    poses = world.poses()
-                    moved += movement(blocks, poses, self.trial).fallen
-                    lying = (poses[b.order].put(b) if b.order in moved else b for b in blocks)
-                    shown = shown or tuple(lying)
-            fallen.update(moved)
-        return Settled(tuple(sorted(fallen)), shown or blocks)
 
-    def _stay(self, blocks: tuple[Block, ...]) -> bool:
-        """True if blocks, alone in the world, stay where they are under every setting."""
-        for physics in self.trial.physics:
-            if physics not in self._worlds:
-                self._worlds[physics] = self._stack.enter_context(World(physics, self._engine))
-            if _tried(self._worlds[physics], blocks, self.trial, QUIET_S).fallen:
-                return False
-        return True
+@functools.lru_cache(maxsize=_KEPT)
+def _stays(group: tuple[Block, ...], trial: Trial, engine: PhysicsEngine) -> bool:
+    """True if a group, alone in the world, stays where it is under every setting."""
+    worlds = (_open_world(physics, engine) for physics in trial.physics)
+    return not any(_tried(world, group, trial, QUIET_S).fallen for world in worlds)
+
+
+@functools.cache
+def _open_world(physics: Physics, engine: PhysicsEngine) -> World:
+    """A world for groups, one after another: PyBullet takes longer to open one than to try one."""
+    return _OPEN.enter_context(World(physics, engine))
 
 
 def _arrangement(group: Sequence[Block]) -> tuple[Block, ...]:
@@ -271,17 +269,6 @@ def _arrangement(group: Sequence[Block]) -> tuple[Block, ...]:
         place = (round(x - x0, _PLACE_DIGITS) + 0.0, round(y - y0, _PLACE_DIGITS) + 0.0, z)
         kept.append(Block(number, block.type, "red", place, block.euler_deg, (), 1))
     return tuple(kept)
-
-
-@functools.cache
-def _shared_site(trial: Trial, engine: PhysicsEngine) -> Site:
-    return Site(trial, engine)
-
-
-def settle(blocks: Sequence[Block], trial: Trial = DEFAULT_TRIAL) -> Settled:
-    """As `Site.settle`, at a site that exists as long as the process; for any thread."""
-    with _ONE_AT_A_TIME:
-        return _shared_site(trial, physics_engine()).settle(blocks)
 
 
 LONGEST_S = 600.0  # Execution of a plan is given up after this time [s].
