@@ -82,7 +82,7 @@ class Stability:
 
 
 # Larger structures have tall columns, some of which fall in PyBullet though they could stand.
-_MOST_PROVEN = 22
+MOST_PROVEN = 22
 
 
 def check(
@@ -90,9 +90,9 @@ def check(
 ) -> Stability:
     """Release each group and see which blocks stay, to the end or until quiet for `quiet_s`.
 
-    Groups that are proven to stand are not simulated, up to `_MOST_PROVEN` blocks in all.
+    Groups that are proven to stand are not simulated, up to `MOST_PROVEN` blocks in all.
     """
-    is_large = len(blocks) > _MOST_PROVEN
+    is_large = len(blocks) > MOST_PROVEN
     parts = [group for group in groups(blocks) if is_large or not is_proven(group)]
     return _try_groups(parts, trial, quiet_s)
 
