@@ -14,7 +14,7 @@ import yaml
 from phyblock.data.base import VERSION_FILE, read_version
 from phyblock.errors import DataError, SpecError
 from phyblock.records.files import read_manifest
-from phyblock.results.compare import check_alike, compare_runs
+from phyblock.results.compare import check_pair, compare_runs
 from phyblock.results.estimates import Headline
 from phyblock.results.load import load_run
 from tests.servers.chassis import Running
@@ -268,7 +268,7 @@ def test_runs_on_two_versions_are_not_mixed(tmp_path: Path) -> None:
 def test_answers_to_two_versions_of_questions_are_not_mixed() -> None:
     runs = [run_of([], manifest(tracks={"vqa": {"questions": digest}})) for digest in "ab"]
     with pytest.raises(SpecError, match=r"tracks.vqa.questions: cannot be .*\n.*found: b"):
-        check_alike(runs[1], runs[0], [], "vqa", Headline(runs[0], "vqa").measure)
+        check_pair(runs[1], runs[0], [], "vqa", Headline(runs[0], "vqa").measure)
 
 
 def test_a_record_is_one_line_of_json_whatever_the_reply_holds(workspace: Workspace) -> None:
