@@ -22,7 +22,7 @@ def plan_record() -> Raw:
     return found
 
 
-def with_value(at: str, value: object) -> bytes:
+def record_with(at: str, value: object) -> bytes:
     """The record with another value at a dotted place, as a line."""
     return json.dumps(broken.with_value(plan_record(), at, value)).encode()
 
@@ -39,19 +39,19 @@ DAMAGED: dict[str, tuple[bytes, str, str]] = {
     "infinity": (with_text('"latency_s":0.0', '"latency_s":-Infinity'), "", "Infinity"),
     "too-large": (with_text('"latency_s":0.0', '"latency_s":1e999'), "", "1e999"),
     "nan-undeclared": (with_text('"seed_sent":true', '"mine":{"x":NaN}'), "", "NaN"),
-    "huge-number": (with_value("reply.usage.completion_tokens", 10**30),
+    "huge-number": (record_with("reply.usage.completion_tokens", 10**30),
         "reply.usage.completion_tokens", "out of range"),
     "many-digits": (with_text('"latency_s":0.0', '"latency_s":' + "9" * 9999), "", "9,999 digits"),
     "deep": (with_text('"latency_s":0.0', '"latency_s":' + "[" * 9999 + "]" * 9999), "", "deep"),
-    "text-for-number": (with_value("seed", "0"), "seed", "wrong type"),
-    "number-for-text": (with_value("reply.text", 5), "reply.text", "wrong type"),
-    "no-cost": (with_value("reply.billed_usd", -5), "reply.billed_usd", "out of range"),
-    "word": (with_value("outcome", "fine"), "outcome", "allowed: ok, "),
-    "finish": (with_value("reply.finish", "never"), "reply.finish", "allowed: stop, "),
-    "truth": (with_value("n_blocks", True), "n_blocks", "wrong type"),
-    "score": (with_value("scores.1.tp", 1.5), "scores[1].tp", "wrong type"),
-    "parse": (with_value("parse.plan", "1, 2"), "parse.plan", "wrong type"),
-    "track": (with_value("track", "singing"), "track", "full_planning"),
+    "text-for-number": (record_with("seed", "0"), "seed", "wrong type"),
+    "number-for-text": (record_with("reply.text", 5), "reply.text", "wrong type"),
+    "no-cost": (record_with("reply.billed_usd", -5), "reply.billed_usd", "out of range"),
+    "word": (record_with("outcome", "fine"), "outcome", "allowed: ok, "),
+    "finish": (record_with("reply.finish", "never"), "reply.finish", "allowed: stop, "),
+    "truth": (record_with("n_blocks", True), "n_blocks", "wrong type"),
+    "score": (record_with("scores.1.tp", 1.5), "scores[1].tp", "wrong type"),
+    "parse": (record_with("parse.plan", "1, 2"), "parse.plan", "wrong type"),
+    "track": (record_with("track", "singing"), "track", "full_planning"),
     "empty": (b"", "", "not a record"),
     "blank": (b"  \r", "", "not a record"),
     "no-object": (b"[1, 2]", "", "not a record"),

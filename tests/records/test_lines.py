@@ -26,8 +26,7 @@ from phyblock.results.load import load_run
 from tests.data.broken import Raw, sound_scene, with_value
 from tests.documents import ROOT
 from tests.fuzz.strategies import sound_question
-from tests.records.damage import DAMAGED, lines_before, plan_record
-from tests.records.damage import with_value as record_with
+from tests.records.damage import DAMAGED, lines_before, plan_record, record_with
 from tests.shipped import DATA, TASKS, built_in_questions
 from tests.web.factory import manifest
 
