@@ -194,6 +194,11 @@ class Workspace:
         less = () if page else ("--no-report",)
         return self.phyblock("run", "suite.yaml", "--out", self.out, *less, *args, **options)
 
+    def copied(self, root: Path) -> Workspace:
+        """A copy of all of it in another folder; pictures stay shared."""
+        shutil.copytree(self.root, root, symlinks=True)
+        return Workspace(root, self.cache / "pictures")
+
     def scored(self, name: str = "scored") -> Path:
         """Copy the run, score the copy again, and return it."""
         copy = shutil.copytree(self.out, self.root / name)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -346,13 +345,12 @@ def finished(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Wo
 
 @pytest.fixture
 def copy(finished: Workspace, tmp_path: Path) -> Workspace:
-    root = tmp_path / "copy"
-    shutil.copytree(finished.root, root, symlinks=True)
+    made = finished.copied(tmp_path / "copy")
     # The manifest names the data by its absolute path.
-    manifest = root / "out" / "run.yaml"
-    text = manifest.read_text(encoding="utf-8").replace(str(finished.root), str(root))
+    manifest = made.out / "run.yaml"
+    text = manifest.read_text(encoding="utf-8").replace(str(finished.root), str(made.root))
     manifest.write_text(text, encoding="utf-8")
-    return Workspace(root, finished.cache / "pictures")
+    return made
 
 
 @pytest.mark.parametrize("bad", BAD, ids=[bad.name for bad in BAD])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections import Counter
 from pathlib import Path
 
@@ -43,9 +42,7 @@ def sound(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Works
 @pytest.fixture(scope="session")
 def ended(sound: Workspace, tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     """The same with a finished run of each track: `out`, `steps` and `asked`."""
-    root = tmp_path_factory.mktemp("ended") / "w"
-    shutil.copytree(sound.root, root, symlinks=True)
-    made = Workspace(root, sound.cache / "pictures")
+    made = sound.copied(tmp_path_factory.mktemp("ended") / "w")
     steps = ["--set", "tracks=[step_planning]", "--set", "steps.physics=off"]
     for args in (
         ["suite.yaml", "--out", "out", "--models", "random,oracle"],

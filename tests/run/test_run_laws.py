@@ -40,9 +40,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Wo
 
 @pytest.fixture
 def copy(finished: Workspace, tmp_path: Path) -> Workspace:
-    root = tmp_path / "copy"
-    shutil.copytree(finished.root, root, symlinks=True)
-    return Workspace(root, finished.cache / "pictures")
+    return finished.copied(tmp_path / "copy")
 
 
 def lasting(files: dict[str, bytes]) -> dict[str, bytes]:
