@@ -24,7 +24,7 @@ from phyblock.results.estimates import Headline
 from phyblock.results.load import load_run
 from phyblock.results.tables import TablesWritten, write_tables
 from phyblock.web.board import SiteRun, Sources, board_of, entries_of
-from phyblock.web.leaderboard import check_runs_alike, write_site
+from phyblock.web.leaderboard import check_runs, write_site
 from phyblock.web.pack import Pack, pack_samples
 from phyblock.web.report import write_report
 from tests.web.factory import laws, manifest, record, record_lists, run_of, score, write_run
@@ -312,7 +312,7 @@ def test_runs_that_differ_in_what_decides_are_refused_with_what_differs(
     first.run.manifest.tracks["full_planning"]["carrying"] = 1
     other = site_run("two", **in_track("full_planning", **change))
     with pytest.raises(SpecError) as caught:
-        check_runs_alike([first, other])
+        check_runs([first, other])
     (problem,) = caught.value.problems
     assert (problem.where, problem.field) == ("two", field)
     assert ("--limit" in problem.hint) == (field == "dataset.sha256")
@@ -321,9 +321,9 @@ def test_runs_that_differ_in_what_decides_are_refused_with_what_differs(
 def test_a_recording_and_a_larger_picture_stand_beside_any_other() -> None:
     first = site_run("one", **in_track("full_planning"))
     larger = site_run("two", **in_track("full_planning", **shown({"size_px": 512}, "b")))
-    check_runs_alike([site_run("one", **in_track("full_planning", **shown({}, "a"))), larger])
+    check_runs([site_run("one", **in_track("full_planning", **shown({}, "a"))), larger])
     asked = {"full_planning": {"prompt": None, "pictures": None}}
-    check_runs_alike([first, site_run("two", **in_track("full_planning", tracks=asked))])
+    check_runs([first, site_run("two", **in_track("full_planning", tracks=asked))])
 
 
 def test_a_build_that_was_stopped_never_looks_whole_and_what_is_not_ours_stays(
