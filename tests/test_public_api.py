@@ -251,8 +251,8 @@ def test_what_is_wrong_with_tasks_and_replies_is_named() -> None:
     wrong: dict[str, Callable[[], object]] = {
         "first: is the place": lambda: phyblock.tasks("full_planning", first=1),
         "found: 2": lambda: phyblock.tasks("full_planning", split="dev", limit=1, first=2),
-        "data: is no data": lambda: phyblock.tasks("full_planning", data=5),  # type: ignore[arg-type]
-        "data[0]: is no scene": lambda: phyblock.tasks("full_planning", data=[1]),  # type: ignore[list-item]
+        "data: is not a data set": lambda: phyblock.tasks("full_planning", data=5),  # type: ignore[arg-type]
+        "data[0]: is not a scene": lambda: phyblock.tasks("full_planning", data=[1]),  # type: ignore[list-item]
         "data[1]: comes a second": lambda: phyblock.tasks("full_planning", data=[scene, scene]),
         "tracks: does not go": lambda: phyblock.tasks("full_planning", "tracks=[vqa]"),
         'split="test", vqa.path': lambda: phyblock.tasks("vqa", split="train"),

@@ -51,7 +51,7 @@ def test_a_reply_is_found_by_key_whatever_the_seed(tmp_path: Path) -> None:
         (b"\xff\xfe\x00", r"007\.json:1:1: is not JSON"),
         (b"[" * 100_000, r"007\.json:1:1: is not JSON: is nested more than 64 levels"),
         (b'{"text": ' + b"9" * 100_000 + b"}", "holds a number of 100,000 digits"),
-        (b'{"error": "overloaded"}', "no recorded reply of a known shape"),
+        (b'{"error": "overloaded"}', "not a recorded reply of a known shape"),
     ],
 )
 def test_a_broken_recording_is_an_error_at_its_place(
