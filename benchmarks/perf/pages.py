@@ -21,7 +21,7 @@ import yaml
 from playwright.sync_api import Browser
 
 from benchmarks.perf.measure import ROOT, run_measured
-from tests.browser import chromium
+from tests.web.conftest import chromium
 
 _OPENED = """() => {
     const [page] = performance.getEntriesByType("navigation");

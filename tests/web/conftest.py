@@ -6,6 +6,7 @@ import json
 import re
 import shutil
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote, urlencode
@@ -37,9 +38,9 @@ def expect(locator: Locator) -> LocatorAssertions:
     return expected(locator)
 
 
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    """A headless Chromium; its event loop runs while it does, so that it ends with its module."""
+@contextmanager
+def chromium() -> Iterator[Browser]:
+    """A headless Chromium; skips where there is none."""
     playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
     found = next(filter(None, map(shutil.which, _CHROMIUMS)), None)
     if found is None:
@@ -48,6 +49,13 @@ def browser() -> Iterator[Browser]:
         running = started.chromium.launch(executable_path=found, args=_FLAGS)
         yield running
         running.close()
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    """A headless Chromium; its event loop runs while it does, so that it ends with its module."""
+    with chromium() as running:
+        yield running
 
 
 class Visit:
