@@ -29,7 +29,7 @@ SCENE_SET_VERSION = 4
 often as goals need them, and shows at least 3 % of every block's outline; 3 excludes scenes of the
 built-in set; 4 accepts only finished structures that are proven to stand.
 """
-QUESTION_SET_VERSION = 8
+QUESTION_SET_VERSION = 9
 """Increased whenever questions with the same name change, so that results are never mixed."""
 _Tasks = Sequence[tuple[Scene, CandidateSet]]
 

@@ -13,7 +13,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import combinations, product
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,7 +42,7 @@ QUESTION_RENDER_VERSION = 2
 """Increased whenever the same recipe gives other pixels, so that stored pictures are redrawn."""
 BLOCK_LABEL = "block"  # The label of a picture that shows one block by itself.
 SEEN_PX = 256  # Side of the pictures that are compared.
-MARKS_APART_PX = 18.0  # Targets are this far apart at the least, in pixels of `SEEN_PX`.
+MARKS_APART_PX = 14.0  # Targets are this far apart at the least, in pixels of `SEEN_PX`.
 
 _BLOCK_WINDOW = Window(-0.52, 0.52, -0.52, 0.52)
 _STYLE = PictureStyle(SEEN_PX)
@@ -216,14 +215,6 @@ def _cost(
     return cost
 
 
-class Top(NamedTuple):
-    """A point of a surface [m], the z of its unit normal, and its offset from the center [m]."""
-
-    position_m: tuple[float, float, float]
-    rise: float
-    off_center_m: float
-
-
 @functools.lru_cache(maxsize=48)
 def seen(recipe: QuestionPicture) -> Shot:
     """The blocks of a picture from its camera, `SEEN_PX` squared, without floor and marks."""
@@ -282,21 +273,7 @@ def block_mark(recipe: QuestionPicture, shot: Shot, order: int, letter: str) -> 
     middle = np.argmin((rows - rows.mean()) ** 2 + (columns - columns.mean()) ** 2)
     pixel = (int(rows[middle]), int(columns[middle]))
     hit = _hit(drawn_blocks(recipe)[vertex], question_camera(recipe, _STYLE), pixel)
-    return None if hit is None else Mark(letter, hit.position_m)
-
-
-def visible_tops(recipe: QuestionPicture, shot: Shot, step_px: int, least_rise: float) -> list[Top]:
-    """Points of surfaces at every `step_px`-th pixel with at least `least_rise`."""
-    camera, blocks = question_camera(recipe, _STYLE), drawn_blocks(recipe)
-    tops = []
-    for row, column in product(range(step_px // 2, SEEN_PX - 2, step_px), repeat=2):
-        around = shot.block[max(row - 2, 0) : row + 3, max(column - 2, 0) : column + 3]
-        vertex = int(around[0, 0])
-        if vertex >= 0 and (around == vertex).all():
-            hit = _hit(blocks[vertex], camera, (row, column))
-            if hit is not None and hit.rise >= least_rise:
-                tops.append(hit)
-    return tops
+    return None if hit is None else Mark(letter, hit)
 
 
 def mark_pixel(recipe: QuestionPicture, position_m: tuple[float, float, float]) -> tuple[int, int]:
@@ -313,17 +290,14 @@ def seen_order(
     return recipe.blocks[vertex].order if vertex >= 0 else None
 
 
-def is_apart(
-    recipe: QuestionPicture, mark: Mark, others: Sequence[Mark], least_px: float = MARKS_APART_PX
-) -> bool:
-    """True if a mark's target is `least_px` pixels of `SEEN_PX` away from all others."""
-    places = np.array([one.position_m for one in (mark, *others)])
+def are_apart(recipe: QuestionPicture, marks: Sequence[Mark]) -> bool:
+    """True if the targets of any two marks are `MARKS_APART_PX` pixels of `SEEN_PX` apart."""
+    places = np.array([mark.position_m for mark in marks])
     pixels = question_camera(recipe, _STYLE).to_pixels(places, SEEN_PX)
-    apart = np.linalg.norm(pixels[1:] - pixels[0], axis=1)
-    return bool(apart.min(initial=np.inf) >= least_px)
+    return all(math.dist(one, other) >= MARKS_APART_PX for one, other in combinations(pixels, 2))
 
 
-def _hit(block: Block, camera: Camera, pixel: tuple[int, int]) -> Top | None:
+def _hit(block: Block, camera: Camera, pixel: tuple[int, int]) -> tuple[float, float, float] | None:
     """Return where the ray through a pixel first meets the block (Moeller-Trumbore), or None."""
     half = camera.half_tangent
     across = ((pixel[1] + 0.5) / SEEN_PX * 2 - 1) * half
@@ -345,7 +319,4 @@ def _hit(block: Block, camera: Camera, pixel: tuple[int, int]) -> Top | None:
         return None
     nearest = int(np.argmin(np.where(met, away, np.inf)))
     x, y, z = (round(float(part), 4) + 0.0 for part in camera.eye_m + away[nearest] * ray)
-    normal = np.cross(one[nearest], two[nearest])
-    middle = (corners.min(axis=(0, 1)) + corners.max(axis=(0, 1))) / 2
-    off_center_m = float(np.hypot(x - middle[0], y - middle[1]))
-    return Top((x, y, z), float(normal[2] / np.linalg.norm(normal)), off_center_m)
+    return x, y, z

@@ -21,7 +21,7 @@ from phyblock.files import bundled
 from phyblock.making.files import question_card, write_questions
 from phyblock.making.questions.audit import SubtaskAudit, audit_questions, duplicates_of
 from phyblock.making.questions.dynamics import OUTCOME_TEXTS
-from phyblock.making.questions.production import make_questions, problem_of
+from phyblock.making.questions.production import MAKERS, make_questions, problem_of
 from phyblock.making.questions.sight import LEAST_PIXELS, palette
 from phyblock.sim.contact import find_gaps
 from phyblock.sim.engine import other_engine
@@ -158,12 +158,14 @@ def test_lines_read_back_as_the_questions(static: list[Question], tmp_path: Path
         write_questions(folder, static, SCENES, "card")
 
 
-def test_the_processes_change_nothing_and_the_seed_does() -> None:
-    def lines(seed: int, jobs: int) -> list[str]:
+def test_processes_and_other_subtasks_change_nothing_and_the_seed_does() -> None:
+    def lines(seed: int, jobs: int, *subtasks: Subtask) -> list[str]:
         names = [scene.id for scene in SOME[:8]]
-        return lines_of(made(names, {"CO": COUNT, "RP": COUNT}, seed, jobs))
+        return lines_of(made(names, dict.fromkeys(subtasks, COUNT), seed, jobs))
 
-    assert lines(1, 1) == lines(1, 2) != lines(2, 1)
+    both = lines(1, 1, "CO", "RP")
+    assert both == lines(1, 2, "CO", "RP") != lines(2, 1, "CO", "RP")
+    assert both == lines(1, 1, "CO") + lines(1, 1, "RP")
 
 
 def test_too_few_scenes_are_told_for_all_subtasks_at_once() -> None:
@@ -182,8 +184,8 @@ def built_in() -> QuestionSet:
 
 def test_the_built_in_set_is_whole_and_even(built_in: QuestionSet) -> None:
     asked = [task.question for task in built_in.tasks]
-    few = {"PD": 100, "AD": 45}
-    assert Counter(q.subtask for q in asked) == dict.fromkeys(SUBTASKS, 150) | few
+    counts = {s: MAKERS[s].count for s in SUBTASKS}
+    assert Counter(q.subtask for q in asked) == counts | {"AD": 45}
     assert not duplicates_of(asked)
     for subtask in SUBTASKS:
         answers = [question.answer for question in asked if question.subtask == subtask]

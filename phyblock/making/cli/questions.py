@@ -73,7 +73,7 @@ def questions() -> None:
     "--per-subtask",
     type=click.IntRange(1),
     metavar="N",
-    help="Questions of each subtask; by default 150, of PD 100, of AD 50.",
+    help="Questions of each subtask; by default 150, of PD 100.",
 )
 @making_options
 def generate(

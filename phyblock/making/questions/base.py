@@ -245,32 +245,25 @@ _EQUAL, _UNLIKE_STEPS = 0.02, 5.0
 
 
 def four_alike(
-    measures: Floats, unlike: Floats, least: float, rng: np.random.Generator, rights: int = 1
+    measures: Floats, unlike: Floats, least: float, rng: np.random.Generator
 ) -> list[int]:
-    """Return a right row and three wrong ones, among which it has about the ranks drawn.
+    """Return row 0, which is right, and three wrong ones, among which it has about the ranks drawn.
 
-    `measures` has shape (n, k), its first `rights` rows are of options that are right. `unlike`,
-    shape (n, n), says how much two differ: any two that are taken do by `least` or more, and the
-    sum over the other three is one more measure. The ranks wanted are those of any one among any
-    four. Empty where none come near.
+    `measures` has shape (n, k). `unlike`, shape (n, n), says how much two differ: any two that are
+    taken do by `least` or more, and the sum over the other three is one more measure. The ranks
+    wanted are those of any one among any four. Empty where none come near.
     """
-    if not 0 < rights <= len(measures) - _WRONG:
+    if len(measures) < len(LETTERS):
         return []
     one, *others = rng.choice(len(measures), size=len(LETTERS), replace=False).tolist()
     wanted = ranks_among(measures, unlike, one, np.array([others]))[0]
-    threes = np.array(list(itertools.combinations(range(rights, len(measures)), _WRONG)))
+    threes = np.array(list(itertools.combinations(range(1, len(measures)), _WRONG)))
     for i, j in itertools.combinations(range(_WRONG), 2):
         threes = threes[unlike[threes[:, i], threes[:, j]] >= least]
-    best: list[int] = []
-    nearest = _MOST_OFF
-    for right in range(rights):
-        fitting = threes[(unlike[right][threes] >= least).all(axis=1)]
-        if len(fitting):
-            off = np.abs(ranks_among(measures, unlike, right, fitting) - wanted).mean(axis=1)
-            place = int(off.argmin())
-            if off[place] < nearest:
-                nearest, best = float(off[place]), [right, *fitting[place].tolist()]
-    return best
+    threes = threes[(unlike[0][threes] >= least).all(axis=1)]
+    off = np.abs(ranks_among(measures, unlike, 0, threes) - wanted).mean(axis=1)
+    is_near = bool(off.min(initial=_MOST_OFF) < _MOST_OFF)
+    return [0, *threes[off.argmin()].tolist()] if is_near else []
 
 
 def ranks_among(measures: Floats, unlike: Floats, right: int, threes: NDArray[np.int64]) -> Floats:

@@ -5,14 +5,12 @@ Questions are proposed by statics alone; simulations confirm those that are sele
 CF: the block that goes supports others of the scene. It is marked in the picture, so that no word
 of the question hints at the answer.
 
-PD: four pictures show the same blocks laid on an unfinished structure, of which one stays. It is as
-often any of the four in order of how far the weights lean to one side, so that where a picture's
-change is tells nothing. Of these, drafts vary in how far its plank hangs over beside the others,
-where planks that hang over as far count in an order drawn.
+PD: four pictures show the same blocks laid on an unfinished structure, of which one stays. In none,
+one or two of the others the plank hangs over less; by how far all leans off the middle of the
+structure it is about as often any of the four.
 
-AD: all places are on flat faces, and no more central where the block stays than elsewhere. Where it
-stays it comes down on the face that is marked. Elsewhere a plank tips under it, as far as such
-places are found, or it meets a neighbor first.
+AD: all places are on two planks in balance. By how far the right one is off the middle of its
+plank, and of the structure, it is about as often any of the four.
 """
 
 from __future__ import annotations
@@ -22,6 +20,7 @@ import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,19 +36,23 @@ from phyblock.domain.blocks import (
 from phyblock.domain.question import LETTERS, Mark, Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
 from phyblock.making.questions import base, sight
-from phyblock.making.questions.base import Draft, Maker, UnfairError, View, pick, shuffled
+from phyblock.making.questions.base import Draft, Floats, Maker, UnfairError, View, pick, shuffled
 from phyblock.making.questions.structures import (
     SPARE_M,
+    THIN_M,
+    UNIT_M,
+    WIDE_M,
     Bench,
     bench,
+    free_tops,
     group_of,
     is_sure,
     lowered,
     lowered_round,
+    stage,
     stays_round,
     surely_stays,
     verdict,
-    with_annex,
 )
 from phyblock.making.scenes.sketch import POSES
 from phyblock.sim.balance import is_balanced, surely_stands
@@ -61,15 +64,13 @@ from phyblock.sim.outcomes import LEAN_DEG, Outcome, after_removal
 from phyblock.sim.pictures import drawn_m
 from phyblock.sim.question_pictures import (
     BLOCK_LABEL,
-    Top,
+    are_apart,
     block_mark,
-    is_apart,
     is_inside,
     mark_pixel,
     seen,
     seen_order,
     shown_pixels,
-    visible_tops,
 )
 
 # CF
@@ -263,9 +264,13 @@ def sure_removal(blocks: tuple[Block, ...], order: int) -> Outcome | None:
 
 _BENCHES_TRIED, _SHOWN, _ONE_STAYS = 80, 60, [True, False, False, False]
 _ELEVATIONS_DEG = (20, 38)
-_LEAN, _LEAST_ACROSS = 2.0, 0.5
+_LEAN, _LEAST_ACROSS, _ON_A_PILLAR = 2.0, 0.5, 0.8
 _SIDES_XY = ((1, 0), (-1, 0), (0, 1), (0, -1))
 _PLANS, _FOURS = 400, 4000
+_OVER = (0, 1, 1, 2, 2, 2)
+"""Ranks of the right plank that are asked for; the higher, the harder to find."""
+Ranks = tuple[int, int]
+"""Of how many of the other options two measures are below that of the right one."""
 
 
 class PredictiveMaker(Maker):
@@ -277,15 +282,11 @@ class PredictiveMaker(Maker):
     drafts_a_scene = 3
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
-        """Propose stages of building and ways to go on, of which one stays.
-
-        The kind is the place of that one by its lean, and its rank by how far the plank hangs over.
-        """
+        """Propose stages of building and ways to go on, of which one stays."""
         for _ in range(self.drafts_a_scene):
-            place, rank = (int(number) for number in rng.integers(len(LETTERS), size=2))
-            tried = (_next_steps(scene, place, rank, rng) for _ in range(_BENCHES_TRIED))
-            first = itertools.islice(itertools.chain.from_iterable(tried), 1)
-            yield from (draft for draft in first if _is_told(draft))
+            ranks = (pick(rng, _OVER), int(rng.integers(len(LETTERS))))
+            tried = (_next_steps(scene, ranks, rng) for _ in range(_BENCHES_TRIED))
+            yield from itertools.islice(itertools.chain.from_iterable(tried), 1)
 
     def rederive(self, question: Question) -> tuple[int, ...]:
         """Decide by statics and simulation."""
@@ -294,65 +295,78 @@ class PredictiveMaker(Maker):
         return base.only_index([_can_follow(shown, one) for one in options])
 
 
-def _next_steps(scene: Scene, place: int, rank: int, rng: np.random.Generator) -> Iterator[Draft]:
+def _next_steps(scene: Scene, ranks: Ranks, rng: np.random.Generator) -> Iterator[Draft]:
     """Yield a question about a bench drawn, as far as one has such plans for it."""
-    on = bench(scene, 2, rng)
-    plans = four_plans(on, place, rank, rng) if on else ()
-    every = [blocks for offs_m in plans if on and (blocks := on.laid(offs_m))]
-    if on is None or len(every) < len(LETTERS):
+    stages = stage(scene, rng)
+    if not (tops := free_tops(stages)):
+        return
+    pillar_m = THIN_M if rng.random() < _ON_A_PILLAR else 0.0
+    first = max(sight.orders_of(scene.blocks)) + 1
+    on = bench(stages, pick(rng, tops), 2, pillar_m, first, rng)
+    every = [blocks for offs_m in four_plans(on, ranks, rng) if (blocks := on.laid(offs_m))]
+    if len(every) < len(LETTERS):
         return
     view, framed = base.drawn_view(rng, _ELEVATIONS_DEG), _framed(every)
     plain = QuestionPicture("scene", on.base, view, framed=framed)
     options = [replace(plain, blocks=blocks) for blocks in every]
     if (
-        sight.are_told_apart(options)
+        is_across(on, view)
+        and sight.are_told_apart(options)
         and min(min(shown_pixels(one, seen(one)).values()) for one in options) >= _SHOWN
         and [surely_stays(p.blocks, p.blocks[-1].order) for p in options] == _ONE_STAYS
+        and stays_leaning(every[0], every[0][-1].order)
     ):
-        facts, kind = {"placed": sight.orders_of(on.base)}, f"place {place}, plank {rank}"
+        facts, kind = {"placed": sight.orders_of(on.base)}, f"plank {ranks[0]}"
         yield Draft(scene, "pd-next", tuple(options), (plain,), {}, facts, kind)
 
 
-def _is_told(draft: Draft) -> bool:
-    """True if the line of the plank runs across the view, and the right picture's blocks by statics
-    stay on a floor that leans twice as far as those of simulations, where they are let go at once.
+def is_across(on: Bench, view: View) -> bool:
+    """True if the line of the plank runs across the view."""
+    return bool(abs(view_axes(*view)[0][on.along]) >= _LEAST_ACROSS)
+
+
+def stays_leaning(blocks: Sequence[Block], order: int) -> bool:
+    """True if by statics all near a block stay on a floor that leans twice as far as those of
+    simulations, where they are let go at once.
     """
-    shown, right = draft.pictures[0], draft.options[0]
-    if not isinstance(right, QuestionPicture):
-        return False
-    plank = right.blocks[len(shown.blocks)]
-    line = np.eye(3)[int(np.diff(bounds_m(plank), axis=0)[0, :2].argmax())]
-    group, slope = group_of(right.blocks, plank.order), _LEAN * math.tan(math.radians(LEAN_DEG))
-    return bool(abs(line @ view_axes(*shown.view_deg)[0]) >= _LEAST_ACROSS) and all(
-        is_balanced(group, (x * slope, y * slope)) for x, y in _SIDES_XY
-    )
+    group, slope = group_of(blocks, order), _LEAN * math.tan(math.radians(LEAN_DEG))
+    return all(is_balanced(group, (x * slope, y * slope)) for x, y in _SIDES_XY)
 
 
-def four_plans(on: Bench, place: int, rank: int, rng: np.random.Generator) -> list[list[float]]:
-    """Return how far each loose block is off the middle of the top [m], in four ways: by a lever,
-    with margins, all stays in the first only; empty where none are found.
+def four_plans(on: Bench, ranks: Ranks, rng: np.random.Generator) -> list[list[float]]:
+    """Return four plans, of which by a lever, with margins, all stays in the first only; empty
+    where none are found.
 
-    So many of the others lean less to one side, and in so many the plank hangs over less.
+    Its ranks are by how far the plank hangs over, and by how far all leans off the middle of the
+    structure.
     """
     near, far = on.limits_m
     plans = on.plans_m(_PLANS, rng)
-    is_free = np.abs(plans[:, 1] - plans[:, 2]) >= on.lengths_m[1:].mean() + SPARE_M
-    plans = plans[is_free]
     leans = on.leans_m(plans)
-    (stays,), (falls,) = np.nonzero(np.abs(leans) <= near), np.nonzero(np.abs(leans) >= far)
-    if not len(stays) or not len(falls):
-        return []
-    wrong = rng.choice(falls, size=(_FOURS, len(LETTERS) - 1))
-    fours = np.column_stack([rng.choice(stays, size=_FOURS), wrong])
+    fours = one_stays(np.abs(leans) <= near, np.abs(leans) >= far, rng)
     gaps = np.diff(np.sort(leans[fours], axis=1), axis=1)
-    # Of plans that hang over as far, one is drawn.
-    over = np.abs(plans[fours, 0]) + rng.uniform(0, SPARE_M, size=fours.shape)
     fitting = (gaps.min(axis=1) >= far - near) & ((gaps[:, :-1] + gaps[:, 1:]).min(axis=1) >= far)
-    fitting &= (leans[fours] < leans[fours[:, :1]]).sum(axis=1) == place
-    fitting &= (over < over[:, :1]).sum(axis=1) == rank
-    chosen = fours[pick(rng, np.flatnonzero(fitting).tolist())] if fitting.any() else ()
-    found: list[list[float]] = plans[chosen].tolist() if len(chosen) else []
+    fitting &= ranks_of(np.abs(plans[fours, 0])) == ranks[0]
+    fitting &= ranks_of(np.abs(leans - on.middle_m)[fours]) == ranks[1]
+    found: list[list[float]] = plans[pick(rng, fours[fitting])].tolist() if fitting.any() else []
     return found
+
+
+def one_stays(stays: NDArray[np.bool_], falls: NDArray[np.bool_], rng: np.random.Generator) -> Ints:
+    """Return fours drawn, (n, 4), of which the first stays and the others fall; none where there
+    are no such.
+    """
+    if not stays.any() or not falls.any():
+        return np.empty((0, len(LETTERS)), dtype=np.int64)
+    wrong = rng.choice(np.flatnonzero(falls), size=(_FOURS, len(LETTERS) - 1))
+    return np.column_stack([rng.choice(np.flatnonzero(stays), size=_FOURS), wrong])
+
+
+def ranks_of(fours: Floats) -> Ints:
+    """Return how many of each four, (n, 4), are below the first; -1 where one is equal to it."""
+    steps = fours[:, 1:] - fours[:, :1]
+    is_apart = (np.abs(steps) >= SPARE_M).all(axis=1)
+    return np.where(is_apart, (steps < 0).sum(axis=1), -1)
 
 
 def _framed(every: Sequence[Sequence[Block]]) -> tuple[Block, ...]:
@@ -380,10 +394,8 @@ Place = tuple[float, float, float]
 """A point of the world [m]."""
 _PLACE_RING_M = 0.005
 """The verdict on a place holds all round it, this far off [m]."""
-_ANNEXED, _STRUCTURES_TRIED, _PROPOSED = 0.6, 3, 6
-_STEP_PX, _APART_PX, _FLAT_RISE = 5, 18.0, 0.99
+_STRUCTURES_TRIED, _LEAST_APART_M, _ROUND_PX, _CLEAR_M = 80, 0.025, 2, 0.006
 _OFF_CENTER_M, _MOST_OF_A_FACE = 0.001, 0.8
-_PLACES_TRIED, _GIVEN_UP, _SORT = 60, 20, 8
 _SAME_HEIGHT_M, _CLEARLY_HIGHER_M = 0.001, 0.01
 
 
@@ -391,37 +403,15 @@ class AffordanceMaker(Maker):
     """Kind: `ad-place`."""
 
     subtask: Subtask = "AD"
-    count = 50
-    spare, doubtful = 2.0, 1.6
+    spare, doubtful = 2.5, 2.0
+    drafts_a_scene = 8
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """Propose a block in a pose drawn, one place where it stays, and three where not."""
-        for _ in range(_STRUCTURES_TRIED):
-            blocks = (with_annex(scene, rng) if rng.random() < _ANNEXED else None) or scene.blocks
-            plain = QuestionPicture("scene", blocks, base.drawn_view(rng))
-            if not sight.are_seen(plain, sight.orders_of(blocks), _ALL_SEEN):
-                continue
-            if not all(map(surely_stands, groups(blocks))):
-                continue
-            tops = visible_tops(plain, seen(plain), _STEP_PX, _FLAT_RISE)
-            block = _drawn_block(plain, rng)
-            staying, wrong = _by_statics(plain, block, shuffled(rng, tops))
-            both = [*staying, *wrong]
-            if not staying or not wrong:
-                continue
-            pixels = np.array([mark_pixel(plain, top.position_m) for top in both], dtype=float)
-            unlike = np.linalg.norm(pixels[:, None] - pixels, axis=2)
-            measures = np.array([_looks_of_place(plain, top) for top in both])
-            for _ in range(_PROPOSED):
-                four = base.four_alike(measures, unlike, _APART_PX, rng, rights=len(staying))
-                puts = [lowered(block, blocks, *both[i].position_m[:2]) for i in four]
-                if four and None not in (stays_round(one, blocks, _PLACE_RING_M) for one in puts):
-                    shown = (plain, QuestionPicture(BLOCK_LABEL, (block,), plain.view_deg))
-                    marks = tuple(Mark("A", both[i].position_m) for i in four)
-                    facts = {"block": block.type, "euler": list(block.euler_deg)}
-                    slots = {"size": _size(block)}
-                    yield Draft(scene, "ad-place", marks, shown, slots, facts)
-                    break
+        for _ in range(self.drafts_a_scene):
+            ranks = (int(rng.integers(len(LETTERS))), int(rng.integers(len(LETTERS))))
+            tried = (_set_down(scene, ranks, rng) for _ in range(_STRUCTURES_TRIED))
+            yield from itertools.islice(itertools.chain.from_iterable(tried), 1)
 
     def rederive(self, question: Question) -> tuple[int, ...]:
         """Decide by statics and simulation of the block at every place, and statics all round."""
@@ -445,13 +435,122 @@ class AffordanceMaker(Maker):
         return base.only_index(stays)
 
 
-def _drawn_block(plain: QuestionPicture, rng: np.random.Generator) -> Block:
-    """Return a block to put down, in a pose whose shape the picture's view shows."""
-    order = max(block.order for block in plain.blocks) + 1
+def _set_down(scene: Scene, ranks: Ranks, rng: np.random.Generator) -> Iterator[Draft]:
+    """Yield a question about places on two planks on the scene, as far as some fit."""
+    blocks, view = stage(scene, rng), base.drawn_view(rng)
+    block = _drawn_block(0, view, rng)
+    spots: list[Spot] = []
+    tops = free_tops(blocks)
+    for top in shuffled(rng, tops)[:2] if len(tops) > 1 else ():
+        first = max(sight.orders_of((*scene.blocks, *blocks))) + 1
+        on = bench(blocks, top, int(rng.integers(2)), pick(rng, (THIN_M, WIDE_M)), first, rng)
+        plans = on.plans_m(_PLANS, rng)
+        plans = plans[np.abs(on.leans_m(plans)) <= on.limits_m[0]]
+        # Planks that hang over far have more places where a block stays off their middle.
+        plans = plans[np.abs(plans[:, 0]).argsort(kind="stable")][len(plans) * 2 // 3 :]
+        laid = on.laid(pick(rng, plans.tolist())) if len(plans) else None
+        if laid is None:
+            return
+        spots += free_spots(on, laid, block)
+        blocks = laid
+    four = four_spots(spots, blocks, view, ranks, rng)
+    plain = QuestionPicture("scene", blocks, view)
+    marks = [Mark("A", spot.place) for spot in four]
+    if not marks or not _are_shown(plain, marks):
+        return
+    block = replace(block, order=max(sight.orders_of(blocks)) + 1)
+    puts = [lowered(block, blocks, *spot.place[:2]) for spot in four]
+    if (
+        all(is_on_face(plain, put, spot.place) for put, spot in zip(puts, four, strict=True))
+        and all(map(surely_stands, groups(blocks)))
+        and [surely_stays((*blocks, put), put.order) for put in puts] == _ONE_STAYS
+        and stays_leaning((*blocks, puts[0]), block.order)
+    ):
+        shown = (plain, QuestionPicture(BLOCK_LABEL, (block,), view))
+        facts = {"block": block.type, "euler": list(block.euler_deg)}
+        slots, kind = {"size": _size(block)}, f"ranks {ranks}"
+        yield Draft(scene, "ad-place", tuple(marks), shown, slots, facts, kind)
+
+
+class Spot(NamedTuple):
+    """A point on the plank of a bench, and how far it is off the middle of the plank.
+
+    By a lever a block put there stays, or falls, or neither is sure.
+    """
+
+    place: Place
+    off_center_m: float
+    stays: bool
+    falls: bool
+
+
+def free_spots(on: Bench, laid: Sequence[Block], block: Block) -> Iterator[Spot]:
+    """Yield spots on the plank, as it was laid, where a block has room beside the weights."""
+    (near, far), mass_kg = on.limits_m, SHAPES[block.type].mass_kg
+    boxes = [bounds_m(one) for one in laid[len(on.base) :]]
+    offs_m = np.array([box.mean(axis=0) for box in boxes]) - bounds_m(on.top).mean(axis=0)
+    offs_m, middle = offs_m[:, on.along], [*boxes[0].mean(axis=0)[:2], boxes[0][1, 2]]
+    room_m = (on.lengths_m[1:] + np.ptp(bounds_m(block)[:, on.along])) / 2 + _CLEAR_M
+    most = round(float(on.lengths_m[0]) / UNIT_M / 2) - 1
+    for step, aside in itertools.product(range(-most, most + 1), (-1, 0, 1)):
+        off_m = offs_m[0] + step * UNIT_M
+        if (np.abs(offs_m[1:] - off_m) >= room_m).all():
+            lean_m = abs(offs_m @ on.masses_kg + mass_kg * off_m) / (on.masses_kg.sum() + mass_kg)
+            at = np.array(middle)
+            at[[on.along, 1 - on.along]] += (step * UNIT_M, aside * UNIT_M)
+            x, y, z = np.round(at, 6).tolist()
+            off_center_m = math.hypot(step, aside) * UNIT_M
+            yield Spot((x, y, z), off_center_m, bool(lean_m <= near), bool(lean_m >= far))
+
+
+def four_spots(
+    spots: Sequence[Spot],
+    blocks: Sequence[Block],
+    view: View,
+    ranks: Ranks,
+    rng: np.random.Generator,
+) -> list[Spot]:
+    """Return four spots, apart as they are seen, of which a block stays on the first only; empty
+    where there are no such.
+
+    Its ranks are by how far it is off the middle of its plank, and of the structure.
+    """
+    stays, falls = (np.array([spot[i] for spot in spots], dtype=bool) for i in (2, 3))
+    fours = one_stays(stays, falls, rng)
+    if not len(fours):
+        return []
+    places_m = np.array([spot.place for spot in spots])
+    seen_m = places_m @ np.array(view_axes(*view)[:2]).T
+    apart_m = np.linalg.norm(seen_m[:, None] - seen_m, axis=2)
+    for i, j in itertools.combinations(range(len(LETTERS)), 2):
+        fours = fours[apart_m[fours[:, i], fours[:, j]] >= _LEAST_APART_M]
+    corners = np.concatenate([bounds_m(block) for block in blocks])
+    middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
+    out_m = np.linalg.norm((places_m - middle)[:, :2], axis=1)
+    off_m = np.array([spot.off_center_m for spot in spots])
+    fitting = (ranks_of(off_m[fours]) == ranks[0]) & (ranks_of(out_m[fours]) == ranks[1])
+    return [spots[i] for i in pick(rng, fours[fitting].tolist())] if fitting.any() else []
+
+
+def _are_shown(plain: QuestionPicture, marks: Sequence[Mark]) -> bool:
+    """True if all blocks show, and each mark is well inside of one, apart from the others."""
+    if not is_inside(replace(plain, marks=tuple(marks))) or not are_apart(plain, marks):
+        return False
+    for mark in marks:
+        row, column = mark_pixel(plain, mark.position_m)
+        rows, columns = (slice(at - _ROUND_PX, at + _ROUND_PX + 1) for at in (row, column))
+        near = seen(plain).block[rows, columns]
+        if near.min() < 0 or near.min() < near.max():
+            return False
+    return sight.are_seen(plain, sight.orders_of(plain.blocks), _ALL_SEEN)
+
+
+def _drawn_block(order: int, view: View, rng: np.random.Generator) -> Block:
+    """Return a block to put down, in a pose whose shape the view shows."""
     while True:
         block_type, euler = pick(rng, _balanced_poses())
         block = Block(order, block_type, pick(rng, COLORS), (0.0, 0.0, 0.0), euler, (), 1)
-        if shows_solid(block, plain.view_deg):
+        if shows_solid(block, view):
             return block
 
 
@@ -485,51 +584,6 @@ def _size(block: Block) -> str:
     """Return length, width and height of a block as it is turned, to half a centimeter."""
     *level, high = (round(float(side) * 200) / 2 for side in np.diff(bounds_m(block), axis=0)[0])
     return f"{max(level):g} by {min(level):g} cm, {high:g} cm high"
-
-
-def _by_statics(
-    plain: QuestionPicture, block: Block, tops: Sequence[Top]
-) -> tuple[list[Top], list[Top]]:
-    """Return places where a block surely stays by statics on the face that is marked, and where
-    not: it falls off that face, or meets a neighbor first and falls.
-    """
-    found: dict[bool, list[Top]] = {True: [], False: []}
-    marks: list[Mark] = []
-    for number, top in enumerate(tops[:_PLACES_TRIED]):
-        if number == _GIVEN_UP and not found[True]:
-            break
-        mark = Mark("A", top.position_m)
-        put = lowered(block, plain.blocks, *top.position_m[:2])
-        blocks, is_on = (*plain.blocks, put), is_on_face(plain, put, top.position_m)
-        stays = is_balanced(group_of(blocks, put.order))
-        if is_on is None or (stays and not is_on) or len(found[stays]) == _SORT:
-            continue
-        if is_apart(plain, mark, marks, _APART_PX / 2) and is_inside(replace(plain, marks=(mark,))):
-            marks.append(mark)
-            if surely_stays(blocks, put.order) is stays:
-                found[stays].append(top)
-    return found[True], found[False]
-
-
-def _looks_of_place(plain: QuestionPicture, top: Top) -> tuple[float, ...]:
-    """Return measures of a place, in the world and the picture, by which it might stand out."""
-    shot = seen(plain)
-    row, column = mark_pixel(plain, top.position_m)
-    under = shot.block == shot.block[row, column]
-    room_px = np.linalg.norm(np.argwhere(~under) - (row, column), axis=1).min()
-    middle = np.mean([bounds_m(block).mean(axis=0) for block in plain.blocks], axis=0)
-    rows, columns = np.nonzero(shot.block >= 0)
-    x, y, z = top.position_m
-    return (
-        20 * top.off_center_m,
-        float(room_px) / 10,
-        10 * z,
-        3 * float(np.hypot(x - middle[0], y - middle[1])),
-        (row - float(rows.mean())) / 30,
-        (column - float(columns.mean())) / 30,
-        abs(column - float(columns.mean())) / 30,
-        5 * float(under.sum() / len(rows)),
-    )
 
 
 @functools.lru_cache(maxsize=64)

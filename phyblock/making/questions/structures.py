@@ -1,12 +1,13 @@
 """Structures whose balance is worth a question, and what statics and simulation say of them.
 
 The structures of the data set are built so that they stand at every step; few of their blocks
-rest on more than they need, and none is held by a weight. An annex is a plank laid on a flat top,
-off its middle as likely as not, with weights on it: a balance, or a cantilever held by one.
+rest on more than they need, and none is held by a weight. A bench is a flat top with a plank to lay
+on it, off its middle as likely as not, and weights on that: a balance, or a cantilever held by one.
 """
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
@@ -18,15 +19,16 @@ from phyblock.domain.blocks import COLORS, SHAPES, BlockType, Euler
 from phyblock.domain.scene import Block, Scene
 from phyblock.making.questions.base import Floats, pick
 from phyblock.sim.balance import MARGIN_M, is_balanced, surely_falls, surely_stands
-from phyblock.sim.contact import bounds_m, drop_height_m, find_gaps, find_overlaps
+from phyblock.sim.contact import bounds_m, drop_height_m, find_overlaps
 from phyblock.sim.dynamics import groups
 from phyblock.sim.geometry import corners_m
 from phyblock.sim.outcomes import holds
 
 SPARE_M = 0.0005
 """Further than the margin of statics a lever decides, as positions are rounded [m]."""
-_UNIT_M = 0.0125
-_TRIED, _PLANS_TRIED, _MOST_LEFT_OUT, _THIN_M = 16, 20, 5, 0.03
+UNIT_M = 0.0125
+"""The step of places along a plank [m]."""
+_MOST_LEFT_OUT = 5
 _FLAT_M, _LEAST_TOP_M, _HIGHEST_M = 0.0005, 0.045, 0.2
 _PLANKS: tuple[BlockType, ...] = ("cuboid3", "cuboid3", "cuboid2")
 _FLAT: Euler = (0.0, 0.0, 0.0)
@@ -34,17 +36,8 @@ _WEIGHTS: tuple[tuple[BlockType, Euler], ...] = (
     *(("cube", _FLAT), ("cylinder", _FLAT), ("cuboid2", (0.0, 90.0, 0.0))),
     *(("cuboid2", (0.0, 0.0, 90.0)), ("cuboid3", (0.0, 90.0, 0.0))),
 )
-_ON_A_PILLAR, _PILLAR_OFF_M = 0.8, 0.0125
-_PILLARS: tuple[tuple[tuple[BlockType, Euler], ...], ...] = tuple(
-    tuple(
-        (block_type, euler)
-        for block_type in ("cuboid1", "cuboid2")
-        for euler in SHAPES[block_type].poses.values()
-        if np.ptp(corners_m(block_type, (0.0, 0.0, 0.0), euler)[:, along]) < _THIN_M
-    )
-    for along in (0, 1)
-)
-"""Blocks to lay a plank on, with their poses, thin along either axis."""
+THIN_M, WIDE_M, _PILLAR_OFF_M = 0.025, 0.05, 0.0125
+"""Thickness of pillars [m], and how far off the middle of a top thin ones stand."""
 _LIFT_M, _DIRECTIONS = 0.6, 8
 
 
@@ -65,29 +58,38 @@ class Bench(NamedTuple):
 
     def laid(self, offs_m: Sequence[float]) -> tuple[Block, ...] | None:
         """Return all blocks, the loose ones so far off the middle of the top [m]; None where they
-        overlap or hang free.
+        overlap.
         """
         middle, blocks = bounds_m(self.top).mean(axis=0), self.base
         for block, off_m in zip(self.loose, offs_m, strict=True):
             x, y = (float(middle[i]) + (off_m if i == self.along else 0.0) for i in (0, 1))
             onto = blocks[len(self.base) :][:1] or [self.top]
             blocks = (*blocks, lowered(block, onto, x, y))
-        return None if find_overlaps(blocks) or find_gaps(blocks) else blocks
+        return None if find_overlaps(blocks) else blocks
 
     @property
     def limits_m(self) -> tuple[float, float]:
         """So far off the middle [m] weights may lean and surely stay; from so far on they fall."""
         return self.reach_m - MARGIN_M - SPARE_M, self.reach_m + MARGIN_M + SPARE_M
 
-    def plans_m(self, count: int, rng: np.random.Generator) -> Floats:
-        """Return places drawn for the loose blocks, off the middle of the top, (count, blocks) [m].
+    @property
+    def middle_m(self) -> float:
+        """Distance of the middle of the structure from that of the top, along the line [m]."""
+        ends = np.array([bounds_m(block)[:, self.along] for block in self.base])
+        top = bounds_m(self.top)[:, self.along]
+        return float((ends.min() + ends.max()) / 2 - top.mean())
 
-        They may overlap.
+    def plans_m(self, count: int, rng: np.random.Generator) -> Floats:
+        """Return places for the loose blocks, off the middle of the top, (plans, blocks) [m].
+
+        These are drawn so often, and left out where two weights are in one place.
         """
-        half = int(self.lengths_m[0] / _UNIT_M / 2)
+        half = int(self.lengths_m[0] / UNIT_M / 2)
         steps = rng.integers(1 - half, half, size=(count, len(self.loose)))
-        plans: Floats = steps.astype(np.float64) * _UNIT_M
+        plans: Floats = steps.astype(np.float64) * UNIT_M
         plans[:, 1:] += plans[:, :1]
+        if len(self.loose) > 2:
+            plans = plans[np.ptp(plans[:, 1:], axis=1) >= self.lengths_m[1:].mean() + SPARE_M]
         return plans
 
     def leans_m(self, plans_m: Floats) -> Floats:
@@ -96,41 +98,37 @@ class Bench(NamedTuple):
         return leans
 
 
-def with_annex(scene: Scene, rng: np.random.Generator) -> tuple[Block, ...] | None:
-    """Return a structure nearly done with a plank and weights on one of its tops, or None.
-
-    Nothing overlaps or hangs free, and all is in balance.
-    """
-    for _ in range(_TRIED):
-        on = bench(scene, 2, rng)
-        plans = on.plans_m(_PLANS_TRIED, rng) if on else ()
-        for plan in plans if on else ():
-            if on and abs(float(on.leans_m(plan))) <= on.limits_m[0]:
-                blocks = on.laid(plan.tolist())
-                if blocks and is_balanced(blocks):
-                    return blocks
-    return None
-
-
-def bench(scene: Scene, weights: int, rng: np.random.Generator) -> Bench | None:
-    """Return a bench with a plank and so many weights; None where no top is free.
-
-    Blocks that are not of the scene have orders above its own.
-    """
+def stage(scene: Scene, rng: np.random.Generator) -> tuple[Block, ...]:
+    """Return a scene nearly done, in an order that its dependencies allow."""
     order = scene.graph.random_order(rng)
     kept = len(order) - int(rng.integers(min(_MOST_LEFT_OUT, max(len(order) - 2, 0)) + 1))
-    base = tuple(scene.blocks[vertex] for vertex in sorted(order[:kept]))
-    first = max(block.order for block in scene.blocks) + 1
-    carrying = {order for block in base for order in block.depend}
-    tops = [block for block in base if block.order not in carrying and _is_flat(block)]
-    if not tops:
-        return None
-    top, along = pick(rng, tops), int(rng.integers(2))
-    if rng.random() < _ON_A_PILLAR:
-        block_type, turned = pick(rng, _PILLARS[along])
+    return tuple(scene.blocks[vertex] for vertex in sorted(order[:kept]))
+
+
+def free_tops(blocks: Sequence[Block]) -> list[Block]:
+    """Return the blocks with a flat top on which nothing rests."""
+    carrying = {order for block in blocks for order in block.depend}
+    return [block for block in blocks if block.order not in carrying and _is_flat(block)]
+
+
+def bench(
+    base: tuple[Block, ...],
+    top: Block,
+    weights: int,
+    pillar_m: float,
+    first: int,
+    rng: np.random.Generator,
+) -> Bench:
+    """Return a bench on a top, with a plank and so many weights, whose orders begin with `first`.
+
+    Where a pillar is asked for, of a thickness above 0, the plank lies on that.
+    """
+    along = int(rng.integers(2))
+    if pillar_m:
+        block_type, turned = pick(rng, _pillars(along, pillar_m))
         pillar = Block(first, block_type, pick(rng, COLORS), (0.0, 0.0, 0.0), turned, (), 1)
         at = bounds_m(top).mean(axis=0)[:2]
-        at[along] += int(rng.integers(-1, 2)) * _PILLAR_OFF_M
+        at[along] += int(rng.integers(-1, 2)) * _PILLAR_OFF_M * (pillar_m < WIDE_M)
         top, first = lowered(pillar, base, *at.tolist()), first + 1
         base = (*base, top)
     low, high = bounds_m(top)
@@ -143,6 +141,17 @@ def bench(scene: Scene, weights: int, rng: np.random.Generator) -> Bench | None:
     lengths = np.array([float(np.diff(bounds_m(block), axis=0)[0, along]) for block in loose])
     masses = np.array([SHAPES[block.type].mass_kg for block in loose])
     return Bench(base, top, along, loose, float(high[along] - low[along]) / 2, lengths, masses)
+
+
+@functools.cache
+def _pillars(along: int, thick_m: float) -> list[tuple[BlockType, Euler]]:
+    """Return blocks to lay a plank on, with their poses, so thick along an axis."""
+    return [
+        (block_type, euler)
+        for block_type in ("cuboid1", "cuboid2")
+        for euler in SHAPES[block_type].poses.values()
+        if abs(np.ptp(corners_m(block_type, (0.0, 0.0, 0.0), euler)[:, along]) - thick_m) < _FLAT_M
+    ]
 
 
 def _is_flat(block: Block) -> bool:
