@@ -151,7 +151,7 @@ def test_samples_that_were_left_out_are_counted(made: Workspace, tmp_path: Path)
     bundle_run(tmp_path / "run", made.root / "less.zip")
     done = made.phyblock("verify", "less.zip", "--data", "data", "--data", "questions")
     assert done.code == 0, done.err
-    assert "19 of 20 expected samples: the run is not whole" in done.out
+    assert "19 of 20 expected samples: the run is not complete" in done.out
 
 
 def of_track(records: list[Raw], track: str, model: str = "random") -> Raw:
