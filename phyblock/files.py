@@ -18,6 +18,7 @@ import fcntl
 import hashlib
 import importlib
 import io
+import itertools
 import json
 import math
 import os
@@ -289,19 +290,36 @@ def append_whole(number: int, data: bytes, *, sync: bool = False) -> None:
         raise
 
 
-def write_named(path: Path, data: bytes | str | Iterable[bytes]) -> None:
-    """Write a file that the user named, replacing an existing one, and create its folders.
+_KIND_BYTES = 4
 
-    Links are followed, since the user made them. Raises StoreError if the disk fails, and if a file
-    that is not regular is there: to replace a device would take it from the whole machine.
+
+def write_named(path: Path, data: bytes | str | Iterable[bytes]) -> None:
+    """Write a file that the user named, replacing one of its kind, and create its folders.
+
+    A file is of its kind if it is empty or begins with the same four bytes, as ZIP archives, GIFs
+    and tables with the same heading do. Links are followed, since the user made them. Raises
+    StoreError if the disk fails, and if anything else is there: to replace a device would take it
+    from the whole machine.
     """
+    whole = data.encode("utf-8", "replace") if isinstance(data, str) else data
+    pieces = iter([whole] if isinstance(whole, bytes) else whole)
+    first = next(pieces, b"")
     with writing(path):
         target = Path(os.path.realpath(path))
-        if target.exists() and not stat.S_ISREG(target.stat().st_mode):
-            what = "a folder" if target.is_dir() else "not a regular file"
-            raise StoreError(Problem(str(path), f"cannot be written: it is {what}"))
+        if target.exists():
+            is_regular, what = stat.S_ISREG(target.stat().st_mode), "a file of another kind"
+            if not is_regular:
+                what = "a folder" if target.is_dir() else "not a regular file"
+            if not is_regular or _begins(target) not in (b"", first[:_KIND_BYTES]):
+                hint = "name another file, or move it away"
+                raise StoreError(Problem(str(path), f"cannot be written: it is {what}", hint=hint))
         target.parent.mkdir(parents=True, exist_ok=True)
-        atomic_write(target, data)
+        atomic_write(target, itertools.chain([first], pieces))
+
+
+def _begins(path: Path) -> bytes:
+    with path.open("rb") as file:
+        return file.read(_KIND_BYTES)
 
 
 LIST = ".generated"

@@ -72,6 +72,19 @@ def test_a_named_file_is_written_through_the_link_that_a_person_made(tmp_path: P
     assert (tmp_path / "target").read_text() == (tmp_path / "deep" / "file").read_text() == "text"
 
 
+def test_a_named_file_replaces_one_of_its_kind_and_no_other(tmp_path: Path) -> None:
+    path = tmp_path / "file"
+    for before in (b"", b"GIF89a old", b"notes", b"GI"):
+        path.write_bytes(before)
+        if before in (b"notes", b"GI"):
+            with pytest.raises(StoreError, match="a file of another kind"):
+                write_named(path, b"GIF89a new")
+            assert path.read_bytes() == before
+        else:
+            write_named(path, iter([b"GIF89a", b" new"]))
+            assert path.read_bytes() == b"GIF89a new"
+
+
 def test_a_device_is_never_replaced(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     for path, said in ((tmp_path / "pipe", "not a regular file"), (tmp_path, "a folder")):

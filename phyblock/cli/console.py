@@ -159,7 +159,7 @@ def may_spend(
         return True
     show()
     if is_asked:
-        return click.confirm("Continue?", default=True)
+        return click.confirm("Continue?", default=False)
     message = "would cost money, and there is no terminal to ask on"
     hint = "agree with --yes"
     if has_limit is not None:

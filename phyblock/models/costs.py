@@ -243,8 +243,8 @@ class ModelBudget:
         while True:
             usd = most_usd()
             if not self._held and self._spent_usd + usd > self._max_usd:
-                spent = f"{self._spent_usd:.4f} spent, the next call can cost {usd:.4f}"
-                raise UnavailableError(f"its max_cost_usd {self._max_usd:g} is reached: {spent}")
+                spent = f"its max_cost_usd: ${self._spent_usd:.4f} of ${self._max_usd:g} spent"
+                raise UnavailableError(f"{spent}; the next call can cost ${usd:.4f}")
             is_slow = self.is_limited and len(self._under_way) > self._settled
             fits = self._spent_usd + self._held_usd + usd <= self._max_usd
             fits = fits and run.spent_usd + run.held_usd + usd <= run.max_usd
@@ -254,8 +254,8 @@ class ModelBudget:
                     self._under_way.add(number)
                 return number
             if not run.holds and run.spent_usd + usd > run.max_usd:
-                spent = f"{run.spent_usd:.4f} spent, the next call can cost {usd:.4f}"
-                raise BudgetReachedError(f"max_cost_usd {run.max_usd:g} is reached: {spent}")
+                spent = f"max_cost_usd: ${run.spent_usd:.4f} of ${run.max_usd:g} spent"
+                raise BudgetReachedError(f"{spent}; the next call can cost ${usd:.4f}")
             run.changed.clear()
             await run.changed.wait()
 

@@ -116,8 +116,6 @@ class Track(ABC):
     """True if blocks are released in a physics engine, unless its section says otherwise."""
 
     items: Sequence[Any]
-    drawn_seeds: Sequence[int]
-    """The seeds of the suite; of seeds with the same presentation only the first."""
 
     def __init__(
         self, suite: Suite, dataset: Dataset, limit: int | None = None, shop: Workshop | None = None
@@ -129,7 +127,6 @@ class Track(ABC):
         self.suite, self.dataset, self.limit, self.shop = suite, dataset, limit, shop
         self.spec: Any = None if self.options is None else suite.section(self.options)
         self.is_blind = isinstance(self.spec, PictureControls) and self.spec.blind
-        self.drawn_seeds = suite.seeds[:1]
         self.prompt = None if shop is None else self.open_prompt()
         self._drawings: dict[tuple[object, ...], tuple[Drawing, ...]] = {}
         self.open()
@@ -266,10 +263,13 @@ class Track(ABC):
         raise NotImplementedError
 
     def identity(self) -> dict[str, Any]:
-        """Return everything that determines its results as JSON: prompt, pictures, engine."""
+        """Return everything that determines its results as JSON: prompt, pictures, engine.
+
+        The pictures are those of seed 0: a run keeps its identity with more seeds, or fewer.
+        """
         identity: dict[str, Any] = {"prompt": None, "pictures": None}
         if self.prompt is not None:
-            shown = [self.shown(item, s) for s in self.drawn_seeds for item in self.items]
+            shown = [self.shown(item, 0) for item in self.items]
             keys = [[one.key for one in found] for found in map(self.drawings, shown) if found]
             version = {"name": self.prompt.name, "version": self.prompt.version}
             identity = {"prompt": version, "pictures": hex_digest(json.dumps(keys))}
@@ -343,8 +343,6 @@ class SceneTrack(Track):
         """Select scenes evenly over levels."""
         suite = self.suite
         self.items = select_tasks(self.dataset.tasks, suite, self.limit)
-        if self.is_blind or suite.candidates.order != "file":
-            self.drawn_seeds = suite.seeds
         if self.draws and self.shop is not None and suite.images.source == "dataset":
             where, message = suite.where("images", "source"), f"{self.name} draws its own pictures"
             hint = "render the pictures: --set images.source=render"

@@ -56,7 +56,7 @@ def test_the_limit_is_not_passed_and_a_higher_one_goes_on(workspace: Workspace) 
         workspace.write_suite(models=["alpha"], seeds=list(range(12)))
         first = workspace.run("--set", f"limits.max_cost_usd={MOST_USD}")
         assert (first.code, first.err) == (1, "")
-        assert f"max_cost_usd {MOST_USD} is reached" in first.out
+        assert f"of ${MOST_USD} spent; the next call can cost $" in first.out
         assert "run the same command again" in first.out
         assert spent(workspace) == pytest.approx(CALL_USD * server.requests)
         # It stops no earlier than it must: another two calls at their dearest would pass it.
@@ -85,7 +85,7 @@ def test_a_server_that_counts_more_than_is_expected_does_not_pass_the_limit_at_o
         workspace.write_suite(models=["alpha"], seeds=list(range(12)))
         done = workspace.run("--set", f"limits.max_cost_usd={5 * usd}")
     assert done.code == 1
-    assert f"the next call can cost {usd:.1f}"[:-2] in done.out
+    assert f"the next call can cost ${usd:.1f}"[:-2] in done.out
     assert 1 < running.server.requests <= 5
     assert spent(workspace) <= 5 * usd
 

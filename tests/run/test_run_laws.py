@@ -173,11 +173,12 @@ def test_what_does_not_change_results_does_not_make_another_run(copy: Workspace)
     assert "All 45 samples are done" in done.out
 
 
+@pytest.mark.parametrize("order", ["file", "shuffled"])
 def test_more_models_and_seeds_go_on_in_the_folder_and_fewer_select_from_it(
-    workspace: Workspace,
+    workspace: Workspace, order: str
 ) -> None:
     workspace.write_scenes()
-    workspace.write_suite(models=["random"], seeds=[1, 0])
+    workspace.write_suite(models=["random"], seeds=[1, 0], candidates={"order": order})
     first = workspace.run()
     assert (first.code, first.err) == (0, "")
     before, lines = workspace.tables(), workspace.records()
