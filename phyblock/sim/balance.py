@@ -32,6 +32,7 @@ from phyblock.sim import certificate
 from phyblock.sim.certificate import Body, Contact, Falls, Stands, Structure
 from phyblock.sim.contact import (
     CONTACT_TOLERANCE_M,
+    FIT_TOLERANCE_M,
     Turned,
     at,
     beside,
@@ -369,7 +370,9 @@ def _between(
     """
     met, is_wide = [], margin_m < 0
     for first, second, axes in piece_pairs(at(one), at(other, way_m)):
-        if not -2 * CONTACT_TOLERANCE_M <= axes.gap_m <= CONTACT_TOLERANCE_M:
+        # A balance must not press on a block across a gap; a fall allows for all that may touch.
+        most_m = CONTACT_TOLERANCE_M if is_wide else FIT_TOLERANCE_M
+        if not -2 * CONTACT_TOLERANCE_M <= axes.gap_m <= most_m:
             continue
         near_m = _NEARLY_SAME_M if is_wide else _SAME_GAP_M
         best = axes.directions[axes.gaps_m > axes.gap_m - near_m]
