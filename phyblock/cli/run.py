@@ -55,7 +55,7 @@ from phyblock.run.plan import (
 )
 from phyblock.run.runner import RunResult, Session, check_ready, completed, remarks_on
 from phyblock.run.store import held_run
-from phyblock.text import counted, one_line
+from phyblock.text import counted, one_line, some_of
 from phyblock.tracks.base import kind_of
 from phyblock.workers import open_workers
 
@@ -161,6 +161,9 @@ def _conclude(console: Console, folder: Path, result: RunResult, view: ProgressV
     unanswered = f"; {result.unanswered}" if result.unanswered else ""
     console.print(f"{done}. Cost so far: {view.cost_text}{unanswered}.{cached}")
     cause = result.stop.cause if result.stop else None
+    if others := [model.name for model in read_manifest(folder).others]:
+        also = f"The run also holds {some_of(others)}: name them with --models to see them again."
+        console.print(also, style="dim")
     if result.left:
         print_again(console, "raise limits.max_cost_usd and run" if cause == "cost" else "run")
     if cause == "interrupted" and result.left:

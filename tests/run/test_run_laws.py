@@ -189,6 +189,7 @@ def test_more_models_and_seeds_go_on_in_the_folder_and_fewer_select_from_it(
     whole = workspace.tables()
     fewer = workspace.run("--set", "seeds=[0,1]", "--set", "settings=[B,A]", "--set", "name=x")
     assert "All 10 samples are done" in fewer.out
+    assert "also holds oracle: name them with --models" in fewer.out
     for done in (workspace.run(), workspace.phyblock("score", "out")):
         assert done.code == 0
         tables = workspace.tables()
