@@ -10,6 +10,7 @@ started one by one.
 from __future__ import annotations
 
 import atexit
+import contextlib
 import functools
 import gc
 import importlib
@@ -238,7 +239,9 @@ def serve(orders: socket.socket) -> None:
         for module in pkgutil.iter_modules(package.__path__, f"{package.__name__}."):
             importlib.import_module(module.name)
     for name in _PRELOADED:
-        importlib.import_module(name)
+        # Other Pythons have neither PyBullet nor what only development needs.
+        with contextlib.suppress(ModuleNotFoundError):
+            importlib.import_module(name)
     _litellm()
     suite_model()
     known_records()
