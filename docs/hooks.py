@@ -29,7 +29,7 @@ BESIDE = {
         for path in (ROOT / "benchmarks" / "schemas").glob("*.json")
     },
 }
-"""Where on the site the files of the repository lie that pages link to."""
+"""Places on the site of the files of the repository that pages link to."""
 
 INSTEAD = {"README.md": "index.md", "benchmarks/schemas": "suites.md"}
 """Pages that stand for something of the repository."""

@@ -303,7 +303,7 @@ def findings_of(facts: SceneFacts, names: Iterable[str]) -> Iterator[Finding]:
 
 
 def is_acceptable(scene: Scene, palette: tuple[Kind, ...]) -> bool:
-    """True if a scene could enter a data set: proven to stand, so that it falls in no engine, and
+    """True if a scene could enter a data set: proven to stand, with margins, and
     with each of its blocks visible in the goal picture. The check ends at the first fault.
     """
     facts = SceneFacts(scene, palette=palette)
