@@ -22,15 +22,7 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from phyblock.bundle import (
-    ABOUT,
-    MEMBERS,
-    add,
-    bundle_run,
-    opened_bundle,
-    portable,
-    unpack,
-)
+from phyblock.bundle import ABOUT, MEMBERS, add, bundle_run, opened_bundle, portable, unpack
 from phyblock.errors import DataError, StoreError
 from phyblock.records.files import MANIFEST, RECORDS, Manifest, known_records
 from phyblock.run.manifest import portable_manifest

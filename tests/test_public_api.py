@@ -47,16 +47,7 @@ def test_public_names_are_these_and_completion_finds_them() -> None:
 def test_importing_phyblock_imports_nothing_heavy() -> None:
     code = "import phyblock, sys; print(*sorted({name.split('.')[0] for name in sys.modules}))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    heavy = {
-        "numpy",
-        "pandas",
-        "litellm",
-        *ENGINES,
-        "aiohttp",
-        "pydantic",
-        "yaml",
-        "click",
-    }
+    heavy = {"numpy", "pandas", "litellm", *ENGINES, "aiohttp", "pydantic", "yaml", "click"}
     assert not heavy & set(done.stdout.split())
 
 

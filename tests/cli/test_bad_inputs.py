@@ -128,21 +128,9 @@ OPTIONS: tuple[Bad, ...] = (
     Bad("validate-device", command("validate", "/dev/zero"), ("/dev/zero: there is no such",)),
     # A file that is there and cannot be read, for root too.
     Bad("validate-locked", command("validate", "/proc/self/mem"), ("mem: cannot be read: ",)),
-    Bad(
-        "validate-noise",
-        noise("n.yaml", "validate", "n.yaml"),
-        ("read: is larger than",),
-    ),
-    Bad(
-        "validate-data",
-        pipe("data/scenes.jsonl", "validate", "data"),
-        ("is not a regular file",),
-    ),
-    Bad(
-        "validate-lines",
-        noise("data/scenes.jsonl", "validate", "data"),
-        ("holds no scenes",),
-    ),
+    Bad("validate-noise", noise("n.yaml", "validate", "n.yaml"), ("read: is larger than",)),
+    Bad("validate-data", pipe("data/scenes.jsonl", "validate", "data"), ("is not a regular file",)),
+    Bad("validate-lines", noise("data/scenes.jsonl", "validate", "data"), ("holds no scenes",)),
     Bad("validate-long", command("validate", LONG), (LONG[:80], "there is no such suite")),
     Bad("run-long", command("run", "suite.yaml", "--models-file", LONG), ("no such models file",)),
     Bad("report-long", command("report", LONG), (LONG[:80],)),

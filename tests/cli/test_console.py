@@ -147,9 +147,7 @@ def test_a_log_tells_of_retries_servers_failures_and_models_that_are_stopped() -
     ]
 
 
-@given(
-    st.lists(st.tuples(st.sampled_from("ab"), st.floats(0, 3), st.booleans()), max_size=100),
-)
+@given(st.lists(st.tuples(st.sampled_from("ab"), st.floats(0, 3), st.booleans()), max_size=100))
 def test_no_model_has_more_than_a_line_in_ten_seconds_and_every_retry_is_counted(
     steps: list[tuple[str, float, bool]],
 ) -> None:

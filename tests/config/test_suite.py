@@ -15,15 +15,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from phyblock.config.suite import (
-    FACTORS,
-    REPEAT,
-    Suite,
-    Variant,
-    VarySpec,
-    load_suite,
-    suite_model,
-)
+from phyblock.config.suite import FACTORS, REPEAT, Suite, Variant, VarySpec, load_suite, suite_model
 from phyblock.config.yaml import dump_yaml
 from phyblock.errors import SpecError
 from phyblock.files import bundled

@@ -138,10 +138,7 @@ def one_round(workspace: Workspace, server: LedgerChat, track: str) -> None:
 
 @pytest.mark.parametrize(("track", "transport"), _CELLS)
 def test_faults(
-    workspace: Workspace,
-    tallies: dict[str, Counter[str]],
-    track: str,
-    transport: str,
+    workspace: Workspace, tallies: dict[str, Counter[str]], track: str, transport: str
 ) -> None:
     seeds = math.ceil(_QUOTA * (1 - _SHARE) / _SHARE / _ASKED_PER_SEED[track]) + 1
     met: Counter[str] = Counter()

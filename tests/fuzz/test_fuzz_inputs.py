@@ -184,10 +184,7 @@ KINDS: dict[str, tuple[float, Cases]] = {
     ),
     # A run whose --out was not drawn writes to results.
     "arguments": (10, _ARGUMENTS.map(lambda args: Case(args, may_write=("fresh", "results")))),
-    "scenes": (
-        12,
-        _file("data/scenes.jsonl", SCENES, ("validate", "data"), _AUDIT, DRY, RUN),
-    ),
+    "scenes": (12, _file("data/scenes.jsonl", SCENES, ("validate", "data"), _AUDIT, DRY, RUN)),
     "questions": (
         8,
         _file(

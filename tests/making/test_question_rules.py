@@ -34,13 +34,7 @@ from phyblock.making.questions.relations import (
     put_beside,
     tipped_over,
 )
-from phyblock.making.questions.sight import (
-    SHAPE_WORDS,
-    Feature,
-    names,
-    resolve,
-    resolve_one,
-)
+from phyblock.making.questions.sight import SHAPE_WORDS, Feature, names, resolve, resolve_one
 from phyblock.making.questions.structures import (
     THIN_M,
     WIDE_M,

@@ -283,9 +283,7 @@ def test_a_repeat_is_found_in_any_order_of_its_options(asked: list[Question]) ->
     assert duplicates_of(asked) == {}
 
 
-def test_a_text_or_a_picture_that_gives_the_answer_away_is_a_finding(
-    asked: list[Question],
-) -> None:
+def test_a_text_or_a_picture_that_gives_the_answer_away_is_a_finding(asked: list[Question]) -> None:
     """The cube is always right; the right one of four equal pictures lacks a block."""
     cubes = [
         replace(q, id=f"sh-{n}", answer=(q.options.index("cube"),))

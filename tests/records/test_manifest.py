@@ -95,10 +95,7 @@ def runs(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Worksp
     return made
 
 
-READERS: dict[str, Callable[[Path], object]] = {
-    "load": load_run,
-    "score": rescore,
-}
+READERS: dict[str, Callable[[Path], object]] = {"load": load_run, "score": rescore}
 
 
 @pytest.mark.parametrize("reader", READERS)

@@ -21,16 +21,7 @@ from phyblock.results.estimates import Headline, all_estimates
 from phyblock.results.load import Run, load_run
 from phyblock.scoring.plan import Counts
 from phyblock.sim.engine import ENGINES
-from tests.web.factory import (
-    LEVELS,
-    laws,
-    manifest,
-    record,
-    record_lists,
-    run_of,
-    score,
-    write_run,
-)
+from tests.web.factory import LEVELS, laws, manifest, record, record_lists, run_of, score, write_run
 
 
 @laws

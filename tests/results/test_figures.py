@@ -88,14 +88,12 @@ def test_a_forest_has_a_row_a_pair_or_of_two_models_a_row_a_part(run: Run) -> No
     assert forest(of_models(run, MODELS[:1]), track=TRACK) is None
 
 
-def test_files_are_the_same_each_time_in_three_formats_with_captions(
-    tmp_path: Path,
-) -> None:
+def test_files_are_the_same_each_time_in_three_formats_with_captions(tmp_path: Path) -> None:
     folder = write_run(tmp_path / "run", records(), manifest(models=MODELS, seeds=[0]))
     run = load_run(folder)
     first = {file: file.read_bytes() for file in write_paper_figures(run, (), Look())}
     assert {file.stem for file in first} == {
-        *("levels-full-planning", "errors", "losses", "cost-full-planning", "forest-full-planning"),
+        *("levels-full-planning", "errors", "losses", "cost-full-planning", "forest-full-planning")
     }
     again = write_paper_figures(run, ["levels-full-planning", "errors"], Look())
     assert len(again) == 10

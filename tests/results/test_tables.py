@@ -17,12 +17,7 @@ from phyblock.results.compare import compare_models, write_comparison
 from phyblock.results.estimates import all_estimates
 from phyblock.results.figures import Look, write_paper_figures
 from phyblock.results.load import Run, load_run, track_measures
-from phyblock.results.tables import (
-    coverage_frame,
-    make_tables,
-    summary_of,
-    write_tables,
-)
+from phyblock.results.tables import coverage_frame, make_tables, summary_of, write_tables
 from phyblock.results.text import NO_VALUE, Column, TextTable, number, to_latex, to_markdown
 from phyblock.tracks.base import kind_of
 from phyblock.types import OUTCOMES

@@ -12,11 +12,7 @@ from typing import Any
 
 import pytest
 
-from tests.servers.batches import (
-    BatchFaults,
-    BatchServer,
-    OpenAIBatches,
-)
+from tests.servers.batches import BatchFaults, BatchServer, OpenAIBatches
 from tests.servers.chassis import Running
 from tests.vqa_set import questions, write_questions
 from tests.workspace import Workspace

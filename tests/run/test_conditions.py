@@ -59,10 +59,7 @@ def test_a_model_that_looks_is_right_in_every_order(workspace: Workspace) -> Non
         for one in shown
     }
     workspace.write_suite(
-        models=["alpha", "beta"],
-        images=APART,
-        seeds=list(SEEDS),
-        candidates={"order": "shuffled"},
+        models=["alpha", "beta"], images=APART, seeds=list(SEEDS), candidates={"order": "shuffled"}
     )
     with Running(sighted(answers)) as running:
         workspace.write_models(running.url, "alpha", "beta", transport="direct")
@@ -147,9 +144,7 @@ def test_episodes_are_shuffled_and_blind_as_well(workspace: Workspace) -> None:
     )
 
 
-def test_blind_baselines_are_scored_beside_models_without_being_named(
-    workspace: Workspace,
-) -> None:
+def test_blind_baselines_are_scored_beside_models_without_being_named(workspace: Workspace) -> None:
     workspace.write_suite(models=["oracle"], levels=[4])
     assert workspace.run().code == 0
     assert {record["model"] for record in workspace.records()} == {"oracle"}

@@ -108,9 +108,7 @@ def test_a_model_that_cannot_answer_is_stopped_alone(workspace: Workspace) -> No
     assert [server.ended["ok"] for server in servers] == [100, 100, 100]
 
 
-def test_a_server_that_is_gone_stops_its_model_and_leaves_the_samples(
-    workspace: Workspace,
-) -> None:
+def test_a_server_that_is_gone_stops_its_model_and_leaves_the_samples(workspace: Workspace) -> None:
     workspace.write_models("http://127.0.0.1:9", "alpha")
     workspace.write_suite(models=["alpha", "random"], seeds=list(range(20)), limits=TWICE)
     done = workspace.run()

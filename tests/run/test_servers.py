@@ -130,10 +130,7 @@ def test_keys_and_pictures_stay_off_the_disk(workspace: Workspace, transport: st
         # What fails for good is recorded with what the server said, and waits grow no longer.
         limits = {"max_attempts": 3, "retry_for_s": 0}
         workspace.write_suite(models=list(entries), seeds=[0, 1], limits=limits)
-        told = [
-            workspace.run("--yes", env=KEYS, fresh=True),
-            workspace.run("--dry-run", env=KEYS),
-        ]
+        told = [workspace.run("--yes", env=KEYS, fresh=True), workspace.run("--dry-run", env=KEYS)]
         told.append(workspace.phyblock("models", env=KEYS))
         told += [workspace.phyblock("models", "check", n, env=KEYS) for n in ("talks", "locked")]
     used = {seen.key for server in servers.values() for seen in server.seen}

@@ -332,8 +332,7 @@ WIRE_FAULTS: Mapping[str, Fault] = {
     ),
     "endless": Fault(partial(_stream, chunk=b" " * 65_536, pause_s=0), "retryable"),
     "endless-gzip": Fault(
-        partial(_stream, chunk=gzip.compress(b" " * 2**20), pause_s=0, encoding="gzip"),
-        "retryable",
+        partial(_stream, chunk=gzip.compress(b" " * 2**20), pause_s=0, encoding="gzip"), "retryable"
     ),
     "drip": Fault(partial(_stream, chunk=b" ", pause_s=_DRIP_S), "retryable"),
     "gzip": Fault(partial(_packed, encoding="gzip"), "reply"),

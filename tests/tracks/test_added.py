@@ -121,8 +121,7 @@ def half() -> Iterator[None]:
 
 
 @pytest.mark.parametrize(
-    "more",
-    [{}, {"name": "steps"}, {"name": "table1"}, {"name": "mine", "tables": ("errors",)}],
+    "more", [{}, {"name": "steps"}, {"name": "table1"}, {"name": "mine", "tables": ("errors",)}]
 )
 def test_a_name_that_is_taken_is_refused(more: dict[str, Any]) -> None:
     kind = type("Taken", (FullPlanning,), {"tables": (), **more})

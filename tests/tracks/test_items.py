@@ -14,14 +14,7 @@ from hypothesis import strategies as st
 from phyblock.domain.scene import AOVGraph, AssemblyTask, Candidate, CandidateSet
 from phyblock.errors import DataError
 from phyblock.records.record import Reply
-from phyblock.tracks.base import (
-    file_plan,
-    in_order,
-    presented,
-    shown_order,
-    spread,
-    stratified,
-)
+from phyblock.tracks.base import file_plan, in_order, presented, shown_order, spread, stratified
 from phyblock.tracks.difficulty import MEASURES, distractor_distance, log_orders
 from tests.shipped import TASKS
 from tests.tracks.opened import track_of
@@ -128,9 +121,7 @@ def test_an_episode_goes_the_same_in_either_numbering(
     assert list(here["parse"]["file_plan"]) == there["parse"]["plan"]
 
 
-def test_a_plain_presentation_changes_nothing(
-    tasks: tuple[AssemblyTask, ...],
-) -> None:
+def test_a_plain_presentation_changes_nothing(tasks: tuple[AssemblyTask, ...]) -> None:
     assert all(presented(task, 5, "file") is task for task in tasks)
     assert file_plan(tasks[0], [1, 2]) is None
     assert track_of("full_planning", tasks, seeds=[0, 1]).about(tasks[0]) == {}

@@ -144,9 +144,7 @@ def test_the_data_sets_picture_is_sent_byte_for_byte_or_parted_in_two_halves(
         draw(tmp_path, OWN, [replace(composite_task, composite=None)])
 
 
-def test_pictures_of_the_data_set_can_leave_out_the_goal(
-    official_checkout: Path,
-) -> None:
+def test_pictures_of_the_data_set_can_leave_out_the_goal(official_checkout: Path) -> None:
     pool = [one for one in official_tasks(official_checkout) if one.composite is not None]
     task = pool[0]
     blind = presented(task, 0, "file", is_blind=True)

@@ -28,13 +28,7 @@ from phyblock.sim.engine import Pose
 from phyblock.sim.geometry import center_cm, origin_m, put
 from phyblock.tracks import pose_planning as pose_track
 from phyblock.tracks.full_planning import PlanSubject
-from phyblock.tracks.pose_planning import (
-    POSE_RULES,
-    PosePlanning,
-    PoseRecord,
-    StepOutcome,
-    written,
-)
+from phyblock.tracks.pose_planning import POSE_RULES, PosePlanning, PoseRecord, StepOutcome, written
 from phyblock.types import REFUSED_ENDS, STEP_ENDS, StepEnd
 from tests.shipped import TASKS
 from tests.sim.structures import block_types, eulers

@@ -272,10 +272,7 @@ def test_a_model_asked_different_things_is_one_row_and_the_same_things_two() -> 
     assert one[0].runs == {"full_planning": 0, "vqa": 1}
     later = site_run("x", **in_track("full_planning", created="2026-11-23", identity="1" * 64))
     names = [entry.name for entry in entries_of([plan, later])]
-    assert names[::2] == [
-        "alpha (2026-11-22, run 00000000)",
-        "alpha (2026-11-23, run 11111111)",
-    ]
+    assert names[::2] == ["alpha (2026-11-22, run 00000000)", "alpha (2026-11-23, run 11111111)"]
     assert len(set(names)) == len(names)
 
 

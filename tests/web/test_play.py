@@ -23,12 +23,7 @@ from phyblock.models.request import HaltedError, Image, Message, Request
 from phyblock.run.runner import RunResult
 from phyblock.tracks.picking import Choice, Pick, Picking
 from phyblock.web.server import LARGEST_BODY_BYTES, Server
-from phyblock.web.session import (
-    NotNowError,
-    Person,
-    PlaySession,
-    plan_session,
-)
+from phyblock.web.session import NotNowError, Person, PlaySession, plan_session
 from tests.workspace import SCENES, Workspace
 
 PICTURE = Image(b"pixels", "candidates", 64, 64)
@@ -386,10 +381,7 @@ def test_whatever_is_asked_for_is_answered_with_a_refusal(
 
 @pytest.mark.parametrize("resets", [True, False])
 def test_who_leaves_while_waiting_leaves_no_word_on_the_terminal(
-    server: Server,
-    session: PlaySession,
-    resets: bool,
-    capfd: pytest.CaptureFixture[str],
+    server: Server, session: PlaySession, resets: bool, capfd: pytest.CaptureFixture[str]
 ) -> None:
     # Threads of earlier requests may still be about to end, and would be taken for this one's.
     until_idle()
