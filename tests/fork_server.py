@@ -324,7 +324,7 @@ def _watch_deeds(file: int) -> None:
 
 def _exit(code: object) -> NoReturn:
     """As the interpreter exits, but without taking every module apart, which takes longest."""
-    threading._shutdown()  # type: ignore[attr-defined]
+    threading._shutdown()
     atexit._run_exitfuncs()
     try:
         sys.stdout.flush()

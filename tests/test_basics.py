@@ -11,10 +11,9 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from operator import truediv
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -43,7 +42,7 @@ def taken_back(cell: str) -> str:
 
 
 @given(risky)
-def test_no_cell_begins_a_formula_and_what_it_held_can_be_had_back(text: str) -> None:
+def test_no_cell_begins_a_formula_and_what_it_held_can_be_had_back(text):
     cell = csv_cell(text)
     assert isinstance(cell, str)
     if cell.startswith(STARTS):
@@ -52,14 +51,14 @@ def test_no_cell_begins_a_formula_and_what_it_held_can_be_had_back(text: str) ->
 
 
 @given(st.integers() | st.floats() | st.none())
-def test_numbers_stay_numbers(value: float | None) -> None:
+def test_numbers_stay_numbers(value):
     assert csv_cell(value) is value
     text = str(value)
     assert csv_cell(text) == text or text == "-inf"
 
 
 @given(st.text(alphabet=st.characters()))
-def test_one_line_is_one_line_that_can_be_written(text: str) -> None:
+def test_one_line_is_one_line_that_can_be_written(text):
     shown = one_line(text)
     assert len(shown) == len(text)
     assert shown.isprintable()
@@ -67,7 +66,7 @@ def test_one_line_is_one_line_that_can_be_written(text: str) -> None:
 
 
 @given(st.text())
-def test_what_a_server_says_steers_no_terminal(message: str) -> None:
+def test_what_a_server_says_steers_no_terminal(message):
     assert str(ModelError(message)).isprintable()
 
 
@@ -85,7 +84,7 @@ def compensating(values: Iterable[Any], /, start: Any = 0) -> Any:
 
 
 @given(st.lists(st.floats(-1e6, 1e6) | st.integers(-9, 9)))
-def test_values_are_added_one_after_another(values: list[float]) -> None:
+def test_values_are_added_one_after_another(values):
     total: float = 0
     for value in values:
         total += value
@@ -113,9 +112,7 @@ def fits() -> list[Any]:
 
 
 @pytest.mark.parametrize("compute", [texts, solids, fits])
-def test_results_are_those_of_either_sum(
-    compute: Callable[[], list[Any]], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_results_are_those_of_either_sum(compute, monkeypatch):
     computed = []
     for either in (rounding, compensating):
         with monkeypatch.context() as patched:
@@ -132,7 +129,7 @@ def die(_: object) -> None:
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-def test_jobs_give_what_functions_give_or_raise() -> None:
+def test_jobs_give_what_functions_give_or_raise():
     with WorkerPool(2) as pool:
         assert list(pool.map(truediv, range(20), [4] * 20)) == [n / 4 for n in range(20)]
         with pytest.raises(ZeroDivisionError) as caught:
@@ -143,12 +140,9 @@ def test_jobs_give_what_functions_give_or_raise() -> None:
         assert broken.value.problems == (Problem("here", "is broken"),)
 
 
-def test_a_process_that_is_killed_fails_its_own_job_alone() -> None:
+def test_a_process_that_is_killed_fails_its_own_job_alone():
     with WorkerPool(2) as pool:
-        jobs: list[Future[object]] = [
-            pool.submit(die if n == 3 else abs, -n)  # type: ignore[arg-type]
-            for n in range(8)
-        ]
+        jobs: list[Future[object]] = [pool.submit(die if n == 3 else abs, -n) for n in range(8)]
         done = [job.exception() or job.result() for job in jobs]
     assert isinstance(done.pop(3), WorkerDiedError)
     assert done == [0, 1, 2, 4, 5, 6, 7]
@@ -171,7 +165,7 @@ pool.submit(time.sleep, 600).result()
 """
 
 
-def test_a_program_without_a_guard_runs_once_and_takes_its_workers_with_it(tmp_path: Path) -> None:
+def test_a_program_without_a_guard_runs_once_and_takes_its_workers_with_it(tmp_path):
     (tmp_path / "program.py").write_text(UNGUARDED)
     words = [sys.executable, str(tmp_path / "program.py")]
     with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as program:
@@ -194,7 +188,7 @@ SQUARES = [number * number for number in range(150)]
 
 
 @pytest.mark.parametrize(("jobs", "size"), [(1, 1), (2, 1), (2, 16)])
-def test_answers_come_in_the_order_of_tasks(jobs: int, size: int) -> None:
+def test_answers_come_in_the_order_of_tasks(jobs, size):
     with open_workers(jobs, size=size) as workers:
         assert list(workers.map(late, iter(range(150)))) == SQUARES
         assert list(workers.map(late, [])) == []
@@ -203,9 +197,7 @@ def test_answers_come_in_the_order_of_tasks(jobs: int, size: int) -> None:
 
 
 @pytest.mark.parametrize("at_once", [True, False])
-def test_shards_end_alike_at_once_or_one_after_another_and_go_on(
-    tmp_path: Path, at_once: bool
-) -> None:
+def test_shards_end_alike_at_once_or_one_after_another_and_go_on(tmp_path, at_once):
     done: list[int] = []
 
     def counted_square(number: int) -> int:
@@ -228,7 +220,7 @@ def test_shards_end_alike_at_once_or_one_after_another_and_go_on(
         Shards(tmp_path / "all.shards", 1, 4, "cubes")
 
 
-def test_processes_that_are_killed_answer_nothing() -> None:
+def test_processes_that_are_killed_answer_nothing():
     pool = WorkerPool(2)
     job = pool.submit(time.sleep, 600)
     assert pool.submit(abs, -1).result() == 1

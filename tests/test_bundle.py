@@ -103,9 +103,7 @@ def with_digests(files: Mapping[str, bytes], about: Raw) -> dict[str, bytes]:
     return {**files, ABOUT: json.dumps({**about, "files": digests}).encode()}
 
 
-def test_a_bundle_verifies_elsewhere_and_holds_nothing_of_this_machine(
-    made: Workspace, tmp_path: Path
-) -> None:
+def test_a_bundle_verifies_elsewhere_and_holds_nothing_of_this_machine(made, tmp_path):
     held = contents(made, tmp_path / "held")
     assert not any(str(made.root).encode() in data for data in held.values())
     assert b"messages" not in held[MANIFEST]
@@ -124,9 +122,7 @@ def test_a_bundle_verifies_elsewhere_and_holds_nothing_of_this_machine(
         assert f"needs the {lacking}, which a bundle does not hold" in done.err
 
 
-def test_a_run_without_its_data_is_bundled_to_the_same_bytes(
-    made: Workspace, tmp_path: Path
-) -> None:
+def test_a_run_without_its_data_is_bundled_to_the_same_bytes(made, tmp_path):
     moved = tmp_path / "moved"
     shutil.copytree(made.out, moved)
     text = (moved / MANIFEST).read_text(encoding="utf-8")
@@ -135,7 +131,7 @@ def test_a_run_without_its_data_is_bundled_to_the_same_bytes(
     assert path.read_bytes() == (made.out / "bundle.zip").read_bytes()
 
 
-def test_samples_that_were_left_out_are_counted(made: Workspace, tmp_path: Path) -> None:
+def test_samples_that_were_left_out_are_counted(made, tmp_path):
     """Anyone may leave out what went wrong and bundle the rest: then it is said."""
     shutil.copytree(made.out, tmp_path / "run")
     lines = (tmp_path / "run" / RECORDS).read_text(encoding="utf-8").splitlines(keepends=True)
@@ -206,14 +202,12 @@ FORGED: dict[str, tuple[Change, str]] = {
 
 
 @pytest.mark.parametrize("name", FORGED)
-def test_what_does_not_follow_from_the_replies_is_refused(
-    made: Workspace, tmp_path: Path, name: str
-) -> None:
+def test_what_does_not_follow_from_the_replies_is_refused(made, tmp_path, name):
     change, said = FORGED[name]
     refused(forged(made, tmp_path / "forged", change), folders(made), match=f"forged.zip.*{said}")
 
 
-def test_what_is_not_changed_is_made_here_to_the_byte(made: Workspace, tmp_path: Path) -> None:
+def test_what_is_not_changed_is_made_here_to_the_byte(made, tmp_path):
     """Forgeries are refused for what was changed, not for how they are made."""
     was = contents(made, tmp_path / "was")
     path = forged(made, tmp_path / "forged", lambda *_: None)
@@ -221,7 +215,7 @@ def test_what_is_not_changed_is_made_here_to_the_byte(made: Workspace, tmp_path:
         assert (found.folder / RECORDS).read_bytes() == was[RECORDS]
 
 
-def test_data_are_never_looked_for_where_a_bundle_says(made: Workspace, tmp_path: Path) -> None:
+def test_data_are_never_looked_for_where_a_bundle_says(made, tmp_path):
     def change(_: list[Raw], manifest: Raw) -> None:
         manifest["dataset"] |= {"root": "/proc", "name": "../../.."}
 
@@ -289,9 +283,7 @@ HOSTILE: dict[str, Callable[[], bytes]] = {
 
 
 @pytest.mark.parametrize("kind", HOSTILE)
-def test_a_hostile_archive_is_refused_and_writes_nothing_elsewhere(
-    tmp_path: Path, kind: str
-) -> None:
+def test_a_hostile_archive_is_refused_and_writes_nothing_elsewhere(tmp_path, kind):
     path, folder = tmp_path / "b.zip", tmp_path / "a" / "b" / "c"
     folder.mkdir(parents=True)
     path.write_bytes(HOSTILE[kind]())
@@ -305,8 +297,8 @@ def test_a_hostile_archive_is_refused_and_writes_nothing_elsewhere(
 @settings(max_examples=80)
 @given(at=st.integers(0, len(PACKED) - 1), byte=st.integers(0, 255), cut=st.booleans())
 def test_a_bundle_that_was_cut_or_changed_is_refused_or_holds_the_same(
-    tmp_path_factory: pytest.TempPathFactory, at: int, byte: int, cut: bool
-) -> None:
+    tmp_path_factory, at, byte, cut
+):
     folder = tmp_path_factory.mktemp("changed")
     rest = b"" if cut else bytes([byte]) + PACKED[at + 1 :]
     (folder / "b.zip").write_bytes(PACKED[:at] + rest)
@@ -329,7 +321,7 @@ def test_a_bundle_that_was_cut_or_changed_is_refused_or_holds_the_same(
         ("hosted_vllm/Qwen/Qwen2-VL", "hosted_vllm/Qwen/Qwen2-VL"),
     ],
 )
-def test_of_what_one_machine_knows_the_ends_of_paths_stay(before: str, after: str) -> None:
+def test_of_what_one_machine_knows_the_ends_of_paths_stay(before, after):
     """Failed requests keep their kind alone; what is sent to a model stays as it is."""
     params = {"stop": ["/no_think", "/a/b"], "extra_body": {"path": "/v1/x"}}
     fields = manifest(models=["alpha"])
@@ -348,7 +340,7 @@ def test_of_what_one_machine_knows_the_ends_of_paths_stay(before: str, after: st
     assert named.reply.provider_model == after
 
 
-def test_a_bundle_that_is_killed_leaves_nothing_behind(made: Workspace, tmp_path: Path) -> None:
+def test_a_bundle_that_is_killed_leaves_nothing_behind(made, tmp_path):
     """Killed once all is packed, before it is put in its place."""
     code = (
         "import os, signal, sys, phyblock.bundle as bundle\n"

@@ -37,9 +37,7 @@ from tests.fuzz.strategies import PICTURES, png_header
 
 
 @given(st.binary() | st.text())
-def test_what_is_written_is_read(
-    tmp_path_factory: pytest.TempPathFactory, data: bytes | str
-) -> None:
+def test_what_is_written_is_read(tmp_path_factory, data):
     folder = tmp_path_factory.mktemp("files")
     path = folder / "file"
     path.write_text("before")
@@ -48,14 +46,14 @@ def test_what_is_written_is_read(
     assert list(folder.iterdir()) == [path]
 
 
-def test_what_cannot_be_replaced_stays_and_nothing_is_left_beside_it(tmp_path: Path) -> None:
+def test_what_cannot_be_replaced_stays_and_nothing_is_left_beside_it(tmp_path):
     (tmp_path / "folder" / "inside").mkdir(parents=True)
     with pytest.raises(OSError, match="folder"):
         atomic_write(tmp_path / "folder", b"data")
     assert list(tmp_path.iterdir()) == [tmp_path / "folder"]
 
 
-def test_what_the_disk_refuses_is_one_of_our_errors(tmp_path: Path) -> None:
+def test_what_the_disk_refuses_is_one_of_our_errors(tmp_path):
     long = tmp_path / ("x" * 300)
     for path, said in ((long, "File name too long"), (tmp_path / "\ud800", "surrogates")):
         with pytest.raises(StoreError, match=f"cannot be written: .*{said}"), writing(path):
@@ -64,7 +62,7 @@ def test_what_the_disk_refuses_is_one_of_our_errors(tmp_path: Path) -> None:
         raise OSError("no words")
 
 
-def test_a_named_file_is_written_through_the_link_that_a_person_made(tmp_path: Path) -> None:
+def test_a_named_file_is_written_through_the_link_that_a_person_made(tmp_path):
     (tmp_path / "link").symlink_to(tmp_path / "target")
     write_named(tmp_path / "link", "text")
     write_named(tmp_path / "deep" / "file", "text")
@@ -72,7 +70,7 @@ def test_a_named_file_is_written_through_the_link_that_a_person_made(tmp_path: P
     assert (tmp_path / "target").read_text() == (tmp_path / "deep" / "file").read_text() == "text"
 
 
-def test_a_named_file_replaces_one_of_its_kind_and_no_other(tmp_path: Path) -> None:
+def test_a_named_file_replaces_one_of_its_kind_and_no_other(tmp_path):
     path = tmp_path / "file"
     for before in (b"", b"GIF89a old", b"notes", b"GI"):
         path.write_bytes(before)
@@ -85,7 +83,7 @@ def test_a_named_file_replaces_one_of_its_kind_and_no_other(tmp_path: Path) -> N
             assert path.read_bytes() == b"GIF89a new"
 
 
-def test_a_device_is_never_replaced(tmp_path: Path) -> None:
+def test_a_device_is_never_replaced(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     for path, said in ((tmp_path / "pipe", "not a regular file"), (tmp_path, "a folder")):
         with pytest.raises(StoreError, match=said):
@@ -105,7 +103,7 @@ _VALUES = st.recursive(
 
 
 @given(_VALUES)
-def test_json_of_ordinary_size_is_read_as_json_reads_it(value: object) -> None:
+def test_json_of_ordinary_size_is_read_as_json_reads_it(value):
     text = json.dumps(value)
     assert load_json(text) == json.loads(text)
 
@@ -124,12 +122,12 @@ def test_json_of_ordinary_size_is_read_as_json_reads_it(value: object) -> None:
         ("{", "Expecting"),
     ],
 )
-def test_json_beyond_the_bounds_is_a_value_error(text: str, message: str) -> None:
+def test_json_beyond_the_bounds_is_a_value_error(text, message):
     with pytest.raises(ValueError, match=message):
         load_json(text)
 
 
-def test_a_file_is_read_up_to_the_limit(tmp_path: Path) -> None:
+def test_a_file_is_read_up_to_the_limit(tmp_path):
     path = tmp_path / "file"
     path.write_bytes(b"x" * 100)
     assert read_bytes(path, 100) == b"x" * 100
@@ -137,7 +135,7 @@ def test_a_file_is_read_up_to_the_limit(tmp_path: Path) -> None:
         read_bytes(path, 99)
 
 
-def test_pipes_and_devices_are_refused_at_once(tmp_path: Path) -> None:
+def test_pipes_and_devices_are_refused_at_once(tmp_path):
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
     for path in (pipe, Path("/dev/zero")):
@@ -147,7 +145,7 @@ def test_pipes_and_devices_are_refused_at_once(tmp_path: Path) -> None:
         read_bytes(tmp_path)
 
 
-def test_text_is_utf_8(tmp_path: Path) -> None:
+def test_text_is_utf_8(tmp_path):
     path = tmp_path / "file"
     path.write_bytes("\ufeffä".encode())
     assert read_text(path) == "ä"
@@ -200,7 +198,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("format_name", GOOD)
-def test_four_formats_are_read(format_name: str, tmp_path: Path) -> None:
+def test_four_formats_are_read(format_name, tmp_path):
     path = tmp_path / "any.name"
     path.write_bytes(GOOD[format_name])
     assert read_picture(path) == GOOD[format_name]
@@ -209,7 +207,7 @@ def test_four_formats_are_read(format_name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("data", "told"), BAD.values(), ids=BAD)
-def test_a_bad_picture_is_refused(data: bytes, told: str, tmp_path: Path) -> None:
+def test_a_bad_picture_is_refused(data, told, tmp_path):
     path = tmp_path / "pic.png"
     path.write_bytes(data)
     with pytest.raises(DataError) as caught:
@@ -222,7 +220,7 @@ def test_a_bad_picture_is_refused(data: bytes, told: str, tmp_path: Path) -> Non
 
 @settings(deadline=None)
 @given(PICTURES)
-def test_any_bytes_are_a_picture_or_a_data_error(data: bytes) -> None:
+def test_any_bytes_are_a_picture_or_a_data_error(data):
     with contextlib.suppress(DataError):
         picture = decode_picture(data, "pic")
         assert 8 <= min(picture.size) <= max(picture.size) <= 10_000
@@ -245,9 +243,7 @@ def put(folder: Path, names: set[str]) -> None:
 
 
 @given(theirs=some, first=some, later=some)
-def test_what_we_never_wrote_is_never_written_over(
-    tmp_path_factory: pytest.TempPathFactory, theirs: set[str], first: set[str], later: set[str]
-) -> None:
+def test_what_we_never_wrote_is_never_written_over(tmp_path_factory, theirs, first, later):
     folder = tmp_path_factory.mktemp("out")
     put(folder, theirs)
     for round_, names in enumerate((first, later, first)):
@@ -263,7 +259,7 @@ def test_what_we_never_wrote_is_never_written_over(
             assert contents(folder) == before | texts
 
 
-def test_links_are_neither_followed_nor_replaced(tmp_path: Path) -> None:
+def test_links_are_neither_followed_nor_replaced(tmp_path):
     (tmp_path / "elsewhere").mkdir()
     (tmp_path / "elsewhere" / "file").write_text("theirs")
     out = tmp_path / "out"
@@ -280,7 +276,7 @@ def test_links_are_neither_followed_nor_replaced(tmp_path: Path) -> None:
     assert contents(tmp_path / "elsewhere") == {"file": "theirs"}
 
 
-def test_a_list_that_is_a_link_is_not_written_through(tmp_path: Path) -> None:
+def test_a_list_that_is_a_link_is_not_written_through(tmp_path):
     theirs = tmp_path / "theirs"
     theirs.write_text("theirs")
     (tmp_path / "out").mkdir()
@@ -291,13 +287,13 @@ def test_a_list_that_is_a_link_is_not_written_through(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["../mine", "a/../../mine", "/mine"])
-def test_no_name_leads_out_of_the_folder(tmp_path: Path, name: str) -> None:
+def test_no_name_leads_out_of_the_folder(tmp_path, name):
     with pytest.raises(StoreError, match="leads out of the folder"):
         OutFolder(tmp_path / "out").write({name: "ours"})
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_list_that_was_cut_short_is_no_failure(tmp_path: Path) -> None:
+def test_a_list_that_was_cut_short_is_no_failure(tmp_path):
     OutFolder(tmp_path).write({"a.csv": "1", "b.md": "1"})
     listed = (tmp_path / LIST).read_bytes()
     os.truncate(tmp_path / LIST, len(listed) - 3)
@@ -308,7 +304,7 @@ def test_a_list_that_was_cut_short_is_no_failure(tmp_path: Path) -> None:
     assert contents(tmp_path) == {"a.csv": "2", "b.md": "1", "c": "3"}
 
 
-def test_only_what_is_ours_is_removed_and_folders_that_are_empty_then(tmp_path: Path) -> None:
+def test_only_what_is_ours_is_removed_and_folders_that_are_empty_then(tmp_path):
     out = OutFolder(tmp_path / "out")
     out.write({"a/b/one": "ours", "a/two": "ours", "c/three": "ours", "d/four": "ours"})
     (out.path / "c" / "theirs").write_text("mine")
@@ -332,7 +328,7 @@ def make(out: OutFolder, name: str, failure: Exception | None = None) -> None:
             raise failure
 
 
-def test_files_that_are_made_together_come_together_or_not_at_all(tmp_path: Path) -> None:
+def test_files_that_are_made_together_come_together_or_not_at_all(tmp_path):
     out = OutFolder(tmp_path / "out")
     with out.making("deep/") as folder:
         (folder / "x").mkdir()
@@ -347,7 +343,7 @@ def test_files_that_are_made_together_come_together_or_not_at_all(tmp_path: Path
     assert sorted(path.name for path in out.path.iterdir()) == [LIST, "deep", "mine"]
 
 
-def test_a_full_disk_leaves_the_file_of_before(tmp_path: Path) -> None:
+def test_a_full_disk_leaves_the_file_of_before(tmp_path):
     path = tmp_path / "file"
     path.write_text("before")
     code = (

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 import pytest
 
@@ -20,7 +19,7 @@ WHOLE = ("quick", "pose")
 @pytest.mark.parametrize(
     "name", [pytest.param(n, marks=pytest.mark.slow if n in WHOLE else ()) for n in golden.RUNS]
 )
-def test_numbers_are_what_they_were(name: str, tmp_path: Path, pictures_dir: Path) -> None:
+def test_numbers_are_what_they_were(name, tmp_path, pictures_dir):
     if name == "paper-table1" and official_root() is None:
         pytest.skip(OFFICIAL_MISSING)
     now = golden.run_numbers(name, tmp_path, pictures_dir)
@@ -28,12 +27,12 @@ def test_numbers_are_what_they_were(name: str, tmp_path: Path, pictures_dir: Pat
 
 
 @pytest.mark.parametrize("name", golden.SUITES)
-def test_requests_are_what_they_were(name: str, tmp_path: Path, pictures_dir: Path) -> None:
+def test_requests_are_what_they_were(name, tmp_path, pictures_dir):
     now = golden.request_digests(name, tmp_path, pictures_dir)
     assert golden.compare(GOLDEN["requests"][name], now, name) == []
 
 
-def test_a_difference_is_named() -> None:
+def test_a_difference_is_named():
     moved = {"estimates.csv": {"random": "1", "oracle": "2"}}
     found = golden.compare({"estimates.csv": {"random": "1", "oracle": "3", "x": "4"}}, moved, "r")
     assert found == ["r: estimates.csv: oracle: differs", "r: estimates.csv: x: is missing"]

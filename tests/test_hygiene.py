@@ -41,7 +41,7 @@ def declared() -> dict[str, str]:
 
 
 @pytest.mark.parametrize("lock", LOCKS)
-def test_every_requirement_is_pinned_with_hashes_and_names_no_host(lock: str) -> None:
+def test_every_requirement_is_pinned_with_hashes_and_names_no_host(lock):
     wrong = [
         block[:60]
         for block in blocks(lock)
@@ -59,23 +59,23 @@ def pins(lock: str) -> set[str]:
     return {pin if several[pin.partition("==")[0]] > 1 else pin.split(" ;")[0] for pin in whole}
 
 
-def test_what_runs_need_is_pinned_alike_for_tests() -> None:
+def test_what_runs_need_is_pinned_alike_for_tests():
     """In one version, tests may have it on more Pythons: an extra brings it there, too."""
     runs, tests = map(pins, LOCKS)
     assert runs <= tests
 
 
-def test_both_lock_files_are_installed_with_their_hashes() -> None:
+def test_both_lock_files_are_installed_with_their_hashes():
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     for lock in LOCKS:
         assert f"$(PIP) --require-hashes --requirement {lock}" in makefile
 
 
-def test_litellm_ends_below_its_next_major_version() -> None:
+def test_litellm_ends_below_its_next_major_version():
     assert declared()["litellm"] == ">=1.83.10,!=1.82.7,!=1.82.8,<2"
 
 
-def test_every_package_that_is_imported_is_declared() -> None:
+def test_every_package_that_is_imported_is_declared():
     imported: set[str] = set()
     for path in (path for package in PACKAGES for path in (ROOT / package).rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
@@ -88,7 +88,7 @@ def test_every_package_that_is_imported_is_declared() -> None:
     assert not missing
 
 
-def test_every_data_set_names_its_licence() -> None:
+def test_every_data_set_names_its_licence():
     folders = [path for path in (ROOT / "benchmarks" / "data").iterdir() if path.is_dir()]
     assert folders
     terms = (ROOT / "LICENSE").read_text(encoding="utf-8")
@@ -96,7 +96,7 @@ def test_every_data_set_names_its_licence() -> None:
         assert terms in (folder / "LICENSE").read_text(encoding="utf-8")
 
 
-def test_nothing_that_is_built_is_tracked() -> None:
+def test_nothing_that_is_built_is_tracked():
     """Pages, scripts of others and runs are made here; what is tracked is what people wrote."""
     words = ["git", "-C", str(ROOT), "ls-files", "-z"]
     listed = subprocess.run(words, capture_output=True, text=True, check=False)
@@ -112,7 +112,7 @@ def test_nothing_that_is_built_is_tracked() -> None:
     assert [file for file in files if file.parts[0] == "results"] == [Path("results/README.md")]
 
 
-def test_tests_that_are_named_are_there() -> None:
+def test_tests_that_are_named_are_there():
     texts = [ROOT / "SECURITY.md", ROOT / "CONTRIBUTING.md", ROOT / ".ci" / "pythons"]
     texts += (ROOT / "docs").rglob("*.md")
     named = {

@@ -24,7 +24,6 @@ from phyblock.records.files import read_manifest, run_records
 from phyblock.records.record import Record
 from phyblock.sim.engine import ENGINES
 from phyblock.tracks.pictures import Workshop
-from tests.workspace import Workspace
 
 NAMES = ["Episode", "PhyblockError", "Run", "Score", "Suite", "Task"]
 NAMES += ["Tasks", "Turn", "__version__", "generate", "load_run", "load_suite", "render"]
@@ -33,7 +32,7 @@ GUIDE = Path(__file__).parents[1] / "docs" / "python.md"
 PNG = b"\x89PNG\r\n\x1a\n"
 
 
-def test_public_names_are_these_and_completion_finds_them() -> None:
+def test_public_names_are_these_and_completion_finds_them():
     assert phyblock.__all__ == NAMES
     assert all(getattr(phyblock, name).__doc__ for name in phyblock.__all__)
     assert set(phyblock.__all__) <= set(dir(phyblock))
@@ -44,16 +43,14 @@ def test_public_names_are_these_and_completion_finds_them() -> None:
         _ = phyblock.nothing
 
 
-def test_importing_phyblock_imports_nothing_heavy() -> None:
+def test_importing_phyblock_imports_nothing_heavy():
     code = "import phyblock, sys; print(*sorted({name.split('.')[0] for name in sys.modules}))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     heavy = {"numpy", "pandas", "litellm", *ENGINES, "aiohttp", "pydantic", "yaml", "click"}
     assert not heavy & set(done.stdout.split())
 
 
-def test_the_guide_runs_and_every_object_shows_itself(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_guide_runs_and_every_object_shows_itself(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     blocks = re.findall(r"```python\n(.*?)```", GUIDE.read_text("utf-8"), re.DOTALL)
     assert len(blocks) == 5
@@ -70,7 +67,7 @@ def test_the_guide_runs_and_every_object_shows_itself(
     assert set(run.estimates["model"]) == {"random", "goal-blind"}
 
 
-def test_what_is_wrong_is_named() -> None:
+def test_what_is_wrong_is_named():
     suite = phyblock.load_suite("quick", "limit=2")
     scene = phyblock.tasks("full_planning", limit=1)[0].item
     wrong: dict[str, typing.Callable[[], object]] = {
@@ -78,8 +75,8 @@ def test_what_is_wrong_is_named() -> None:
         "load_suite: suite: is too short": lambda: phyblock.load_suite(""),
         "--set limit=0": lambda: phyblock.load_suite("quick", "limit=0"),
         "has no such task": lambda: phyblock.tasks("full_planning", limit=1)["l9"],
-        "render: show": lambda: phyblock.render(scene, show="all"),  # type: ignore[arg-type]
-        "background is 'sea'": lambda: phyblock.render(scene, background="sea"),  # type: ignore[arg-type]
+        "render: show": lambda: phyblock.render(scene, show="all"),
+        "background is 'sea'": lambda: phyblock.render(scene, background="sea"),
         "size_px is 5": lambda: phyblock.render(scene, size_px=5),
         "tasks: track": lambda: phyblock.tasks("full"),
         "tasks: split: has no questions": lambda: phyblock.tasks("vqa", split="train"),
@@ -87,27 +84,25 @@ def test_what_is_wrong_is_named() -> None:
         "tasks: limit": lambda: phyblock.tasks("vqa", limit=0),
         "levels[0]": lambda: phyblock.tasks("full_planning", levels=[7]),
         "generate: count": lambda: phyblock.generate(0),
-        "verify: scene": lambda: phyblock.verify("x"),  # type: ignore[arg-type]
+        "verify: scene": lambda: phyblock.verify("x"),
         "run_suite: limit": lambda: phyblock.run_suite(suite, limit=0),
         "run_suite: models: has the wrong type": lambda: phyblock.run_suite(suite, models="random"),
-        "run_suite: models[0]": lambda: phyblock.run_suite(suite, models=[1]),  # type: ignore[list-item]
+        "run_suite: models[0]": lambda: phyblock.run_suite(suite, models=[1]),
         "run_suite: models: has too few items": lambda: phyblock.run_suite(suite, models=[]),
         "run_suite: out: is too short": lambda: phyblock.run_suite(suite, out=""),
-        'found: "x"': lambda: phyblock.run_suite(suite, limit="x"),  # type: ignore[arg-type]
+        'found: "x"': lambda: phyblock.run_suite(suite, limit="x"),
         "found: true": lambda: phyblock.run_suite(suite, limit=True),
-        "render: scene": lambda: phyblock.render(suite),  # type: ignore[arg-type]
-        "render: size_px": lambda: phyblock.render(scene, size_px=128.5),  # type: ignore[arg-type]
-        "render: view": lambda: phyblock.render(scene, view=["front"]),  # type: ignore[arg-type]
-        "load_suite: overrides": lambda: phyblock.load_suite("quick", 5),  # type: ignore[arg-type]
+        "render: scene": lambda: phyblock.render(suite),
+        "render: size_px": lambda: phyblock.render(scene, size_px=128.5),
+        "render: view": lambda: phyblock.render(scene, view=["front"]),
+        "load_suite: overrides": lambda: phyblock.load_suite("quick", 5),
     }
     for said, call in wrong.items():
         with pytest.raises(SpecError, match=re.escape(said)):
             call()
 
 
-def test_nothing_is_spent_unasked_and_a_loop_may_run(
-    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_nothing_is_spent_unasked_and_a_loop_may_run(workspace, monkeypatch):
     monkeypatch.chdir(workspace.root)
     monkeypatch.setenv("OPENAI_API_KEY", "sk-nobody")
     (workspace.root / "billed.yaml").write_text(
@@ -140,7 +135,7 @@ def judged(record: Record) -> dict[str, object]:
 
 
 @pytest.mark.parametrize("track", TRACKS)
-def test_a_reply_is_worth_what_it_is_in_a_run(track: str, tmp_path: Path) -> None:
+def test_a_reply_is_worth_what_it_is_in_a_run(track, tmp_path):
     folder = tmp_path / "run"
     phyblock.run_suite(TRACKS[track], models=["random"], limit=4, out=folder)
     records = [one for _, one in run_records(folder, read_manifest(folder))]
@@ -153,7 +148,7 @@ def test_a_reply_is_worth_what_it_is_in_a_run(track: str, tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("track", TRACKS)
-def test_a_task_asks_as_a_run_does(track: str) -> None:
+def test_a_task_asks_as_a_run_does(track):
     found = phyblock.tasks(track, limit=2)
     shop = Workshop()
     try:
@@ -172,7 +167,7 @@ def test_a_task_asks_as_a_run_does(track: str) -> None:
         shop.close()
 
 
-def test_the_rewards_of_an_episode_sum_to_its_score() -> None:
+def test_the_rewards_of_an_episode_sum_to_its_score():
     task = phyblock.tasks("step_planning", "candidates.order=file", limit=2)[0]
     replies = ["Next plan: Move(1)", "I do not know.", *["Next plan: Move(2)"] * 40]
     episode, total, said = task.episode(), 0.0, 0
@@ -190,7 +185,7 @@ def test_the_rewards_of_an_episode_sum_to_its_score() -> None:
         phyblock.tasks("full_planning", limit=1)[0].episode()
 
 
-def test_threads_and_processes_share_nothing() -> None:
+def test_threads_and_processes_share_nothing():
     found = phyblock.tasks("full_planning", "images.size_px=128", levels=[1, 2], limit=6)
     reply = "Step1: Move block with index 1\nStep2: Move block with index 2"
 
@@ -205,7 +200,7 @@ def test_threads_and_processes_share_nothing() -> None:
     assert pickle.loads(pickle.dumps(score)) == score
 
 
-def test_streams_hold_no_scene_of_the_test_set_and_begin_anywhere() -> None:
+def test_streams_hold_no_scene_of_the_test_set_and_begin_anywhere():
     stream = phyblock.tasks("full_planning", split="train", levels=[1, 2], seed=5)
     first = list(itertools.islice(stream, 3))
     again = list(itertools.islice(stream, 3))
@@ -221,7 +216,7 @@ def test_streams_hold_no_scene_of_the_test_set_and_begin_anywhere() -> None:
         len(stream)
 
 
-def test_finite_sets_hold_each_scene_once_and_have_slices() -> None:
+def test_finite_sets_hold_each_scene_once_and_have_slices():
     stream = phyblock.tasks("full_planning", split="train", levels=[1], seed=1)
     drawn = [one.key for one in itertools.islice(stream, 3)]
     assert drawn[2] == drawn[0], "the scene comes again"
@@ -234,7 +229,7 @@ def test_finite_sets_hold_each_scene_once_and_have_slices() -> None:
         _distinct(itertools.repeat(finite[0].track.dataset.tasks[0]), 2)
 
 
-def test_what_is_wrong_with_tasks_and_replies_is_named() -> None:
+def test_what_is_wrong_with_tasks_and_replies_is_named():
     finite = phyblock.tasks("full_planning", limit=1)
     stream = phyblock.tasks("full_planning", split="train")
     scene = finite[0].track.dataset.tasks[0]
@@ -242,23 +237,23 @@ def test_what_is_wrong_with_tasks_and_replies_is_named() -> None:
     wrong: dict[str, Callable[[], object]] = {
         "first: is the place": lambda: phyblock.tasks("full_planning", first=1),
         "found: 2": lambda: phyblock.tasks("full_planning", split="dev", limit=1, first=2),
-        "data: is not a data set": lambda: phyblock.tasks("full_planning", data=5),  # type: ignore[arg-type]
-        "data[0]: is not a scene": lambda: phyblock.tasks("full_planning", data=[1]),  # type: ignore[list-item]
+        "data: is not a data set": lambda: phyblock.tasks("full_planning", data=5),
+        "data[0]: is not a scene": lambda: phyblock.tasks("full_planning", data=[1]),
         "data[1]: comes a second": lambda: phyblock.tasks("full_planning", data=[scene, scene]),
         "tracks: does not go": lambda: phyblock.tasks("full_planning", "tracks=[vqa]"),
         'split="test", vqa.path': lambda: phyblock.tasks("vqa", split="train"),
-        "takes texts": lambda: steps.episode().step(None),  # type: ignore[arg-type]
-        "reply: cannot be scored": lambda: steps.score(5),  # type: ignore[arg-type]
+        "takes texts": lambda: steps.episode().step(None),
+        "reply: cannot be scored": lambda: steps.score(5),
         "by place": lambda: stream[:2],
         "found: -1": lambda: stream[-1],
-        "found: None": lambda: finite[None],  # type: ignore[call-overload]
+        "found: None": lambda: finite[None],
     }
     for said, call in wrong.items():
         with pytest.raises(SpecError, match=re.escape(said)):
             call()
 
 
-def test_answers_can_be_asked_for_as_json() -> None:
+def test_answers_can_be_asked_for_as_json():
     (task,) = phyblock.tasks("vqa", "answer_format=json_schema", "vqa.subtasks=[SH]", limit=1)
     assert task.answer_schema is not None
     assert task.answer_schema["required"] == ["reasoning", "answer"]

@@ -342,7 +342,7 @@ def copy(finished: Workspace, tmp_path: Path) -> Workspace:
 
 
 @pytest.mark.parametrize("bad", BAD, ids=[bad.name for bad in BAD])
-def test_bad_input(copy: Workspace, bad: Bad) -> None:
+def test_bad_input(copy, bad):
     args = bad.prepare(copy)
     before = copy.files()
     done = copy.phyblock(*args, env=dict(bad.env), bytes_left=bad.bytes_left)
@@ -360,7 +360,7 @@ def test_bad_input(copy: Workspace, bad: Bad) -> None:
     assert all(name.startswith(bad.writes or ("/",)) for name in after.keys() - before.keys())
 
 
-def test_many_problems_are_cut_and_counted(capsys: pytest.CaptureFixture[str]) -> None:
+def test_many_problems_are_cut_and_counted(capsys):
     show_problems(InputError([Problem("s.yaml", f"is wrong {n}") for n in range(60)]))
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 26

@@ -6,7 +6,6 @@ import csv
 import io
 import itertools
 import re
-from pathlib import Path
 
 import pandas as pd
 from hypothesis import given
@@ -50,9 +49,7 @@ def tables(draw: st.DrawFn) -> TextTable:
 
 
 @given(view=tables(), width=st.integers(60, 200))
-def test_no_line_is_wider_than_the_terminal_and_every_cell_stands_whole(
-    view: TextTable, width: int
-) -> None:
+def test_no_line_is_wider_than_the_terminal_and_every_cell_stands_whole(view, width):
     console = make_console()
     console.file, console.width = io.StringIO(), width
     print_table(console, view)
@@ -67,7 +64,7 @@ def test_no_line_is_wider_than_the_terminal_and_every_cell_stands_whole(
             assert words.count(cell) == (pieces if is_name else 1)
 
 
-def test_tables_show_names_as_they_are() -> None:
+def test_tables_show_names_as_they_are():
     console = make_console()
     console.file = io.StringIO()
     columns = (Column("Model", is_text=True), Column("F1"))
@@ -83,7 +80,7 @@ def test_tables_show_names_as_they_are() -> None:
     assert any(SHOWN in line and line.rstrip().endswith("1.0") for line in shown.splitlines())
 
 
-def test_no_cell_of_any_csv_is_a_formula(tmp_path: Path) -> None:
+def test_no_cell_of_any_csv_is_a_formula(tmp_path):
     records = [
         record(FORMULA, scene, scores=[score(1, 1, 1)], text="-2+3+cmd|' /C calc'!A0")
         for scene in LEVELS
@@ -127,7 +124,7 @@ def logged(*events: tuple[float, RunEvent | None], **models: int) -> list[str]:
     return screen.getvalue().splitlines()
 
 
-def test_a_log_tells_of_retries_servers_failures_and_models_that_are_stopped() -> None:
+def test_a_log_tells_of_retries_servers_failures_and_models_that_are_stopped():
     lines = logged(
         (0.0, retry()),
         (1.0, RunNotice("http://host:1 cannot be reached [x] :b: no connection")),
@@ -148,9 +145,7 @@ def test_a_log_tells_of_retries_servers_failures_and_models_that_are_stopped() -
 
 
 @given(st.lists(st.tuples(st.sampled_from("ab"), st.floats(0, 3), st.booleans()), max_size=100))
-def test_no_model_has_more_than_a_line_in_ten_seconds_and_every_retry_is_counted(
-    steps: list[tuple[str, float, bool]],
-) -> None:
+def test_no_model_has_more_than_a_line_in_ten_seconds_and_every_retry_is_counted(steps):
     now_s, said = 0.0, dict[str, list[float]](a=[], b=[])
     counted = 0
     screen = io.StringIO()
@@ -177,13 +172,13 @@ def test_no_model_has_more_than_a_line_in_ten_seconds_and_every_retry_is_counted
     assert counted == sum(is_retry for *_, is_retry in steps)
 
 
-def test_before_anything_is_asked_scenes_are_being_prepared() -> None:
+def test_before_anything_is_asked_scenes_are_being_prepared():
     lines = logged((12.0, None), (23.0, done()))
     assert lines[0] == "Preparing scenes ... (12 s)"
     assert lines[1].startswith("1 of 10 samples after 23 s")
 
 
-def test_no_time_is_told_before_every_model_has_given_answers() -> None:
+def test_no_time_is_told_before_every_model_has_given_answers():
     """Two models of 100 samples: alpha answers every second, beta every ten from 100 s on."""
     events = [(float(second), done("alpha")) for second in range(1, 101)]
     events += [(100.0 + 10 * n, done("beta")) for n in range(1, 31)]

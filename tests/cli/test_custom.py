@@ -23,7 +23,7 @@ def own_prompt(workspace: Workspace) -> Path:
     return path
 
 
-def test_a_prompt_beside_the_suite_is_used_and_said(asked: Workspace) -> None:
+def test_a_prompt_beside_the_suite_is_used_and_said(asked):
     text = "{% block user %}Which of the {{ n_candidates }}?{% endblock %}"
     own_prompt(asked).write_text(text, encoding="utf-8")
     with Running(OpenAIChat()) as running:
@@ -50,9 +50,7 @@ def test_a_prompt_beside_the_suite_is_used_and_said(asked: Workspace) -> None:
     ],
 )
 @pytest.mark.parametrize("verb", ["validate", "run"])
-def test_a_prompt_is_rendered_before_anything_is_asked(
-    asked: Workspace, text: str, said: str, verb: str
-) -> None:
+def test_a_prompt_is_rendered_before_anything_is_asked(asked, text, said, verb):
     asked.write_models("http://127.0.0.1:9", "alpha")
     own_prompt(asked).write_text(text, encoding="utf-8")
     done = asked.phyblock(verb, "suite.yaml")
@@ -63,9 +61,7 @@ def test_a_prompt_is_rendered_before_anything_is_asked(
 
 
 @pytest.mark.parametrize("suite", ["quick", "steps", "vqa", "sensitivity"])
-def test_what_init_lays_out_is_sound_and_its_prompts_are_used(
-    workspace: Workspace, suite: str
-) -> None:
+def test_what_init_lays_out_is_sound_and_its_prompts_are_used(workspace, suite):
     assert workspace.phyblock("init", "mine", "--suite", suite).code == 0
     root = workspace.root / "mine"
     workspace.write_yaml("mine/models.yaml", {"alpha": "openai/some-model"})
@@ -98,7 +94,7 @@ def suite(workspace: Workspace) -> Workspace:
     return workspace
 
 
-def test_a_baseline_of_a_module_is_run_and_shown(suite: Workspace) -> None:
+def test_a_baseline_of_a_module_is_run_and_shown(suite):
     assert suite.run().code == 2
     words = ("run", "suite.yaml", "--out", suite.out, "--no-report")
     done = suite.phyblock("--plugin", "mine", *words, fresh=True)
@@ -107,7 +103,7 @@ def test_a_baseline_of_a_module_is_run_and_shown(suite: Workspace) -> None:
     assert {tuple(record["parse"]["plan"]) for record in suite.records()} == {(16,)}
 
 
-def test_an_entry_point_is_loaded_without_being_named(suite: Workspace) -> None:
+def test_an_entry_point_is_loaded_without_being_named(suite):
     about = suite.root / "mine-1.0.dist-info"
     about.mkdir()
     (about / "METADATA").write_text("Metadata-Version: 2.1\nName: mine\nVersion: 1.0\n")

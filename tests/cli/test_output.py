@@ -63,7 +63,7 @@ def suite(workspace: Workspace, monkeypatch: pytest.MonkeyPatch) -> Workspace:
     return workspace
 
 
-def test_a_pipe_gets_whole_tables_without_escapes(suite: Workspace) -> None:
+def test_a_pipe_gets_whole_tables_without_escapes(suite):
     done = suite.run()
     assert done.code == 0
     assert "\x1b" not in done.out
@@ -71,7 +71,7 @@ def test_a_pipe_gets_whole_tables_without_escapes(suite: Workspace) -> None:
     assert done.out.splitlines()[-1] == "out/tables"
 
 
-def test_a_terminal_shows_bars_and_then_the_tables(suite: Workspace) -> None:
+def test_a_terminal_shows_bars_and_then_the_tables(suite):
     class Bracketing(OpenAIChat):
         """A model whose messages look like markup."""
 
@@ -93,9 +93,7 @@ def test_a_terminal_shows_bars_and_then_the_tables(suite: Workspace) -> None:
 
 
 @pytest.mark.parametrize(("answer", "code", "calls"), [("n\n", 1, 0), ("y\n", 0, 5)])
-def test_a_person_is_asked_before_money_is_spent(
-    suite: Workspace, answer: str, code: int, calls: int
-) -> None:
+def test_a_person_is_asked_before_money_is_spent(suite, answer, code, calls):
     with Running(OpenAIChat()) as running:
         suite.write_models(running.url, "alpha", price={"input": 1.0, "output": 1.0})
         found, screen = in_terminal(suite, answer, "--models", "alpha")
@@ -106,7 +104,7 @@ def test_a_person_is_asked_before_money_is_spent(
     assert suite.out.exists() == (code == 0)
 
 
-def test_nothing_is_spent_unasked_where_nobody_can_be_asked(suite: Workspace) -> None:
+def test_nothing_is_spent_unasked_where_nobody_can_be_asked(suite):
     with Running(OpenAIChat()) as running:
         suite.write_models(running.url, "alpha", price={"input": 1.0, "output": 1.0})
         refused = suite.run("--models", "alpha")
@@ -128,7 +126,7 @@ def test_nothing_is_spent_unasked_where_nobody_can_be_asked(suite: Workspace) ->
         assert (limited.code, running.server.requests) == (0, 10), limited.err
 
 
-def test_the_folder_of_a_run_is_found_again_without_naming_it(suite: Workspace) -> None:
+def test_the_folder_of_a_run_is_found_again_without_naming_it(suite):
     first = suite.phyblock("run", "suite.yaml")
     assert first.code == 0
     (folder,) = (suite.root / "results").iterdir()
@@ -173,9 +171,7 @@ def finished(tmp_path: Path) -> Path:
 @pytest.mark.parametrize(
     "name", ["report/ch1/thesis.tex", "report.html", "tables/table1.md", "notes.txt"]
 )
-def test_a_run_begins_in_no_folder_of_another(
-    suite: Workspace, name: str, options: tuple[str, ...]
-) -> None:
+def test_a_run_begins_in_no_folder_of_another(suite, name, options):
     put(suite.out / name)
     before = files(suite.root)
     with pytest.raises(StoreError, match="is not empty and holds no run"):
@@ -197,12 +193,12 @@ def test_a_run_begins_in_no_folder_of_another(
         ("init", ""),
     ],
 )
-def test_an_empty_path_is_a_slip_and_not_this_folder(words: tuple[str, ...]) -> None:
+def test_an_empty_path_is_a_slip_and_not_this_folder(words):
     with pytest.raises(click.UsageError, match="empty"):
         invoked(*words)
 
 
-def test_a_tilde_is_the_home_folder(suite: Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_tilde_is_the_home_folder(suite, monkeypatch):
     home = str(suite.root / "home")
     monkeypatch.chdir(suite.root)
     invoked("init", "~/bench", HOME=home)
@@ -222,7 +218,7 @@ IN_THE_WAY: dict[str, tuple[Prepare, str]] = {
 
 
 @pytest.mark.parametrize("name", IN_THE_WAY)
-def test_what_is_in_the_way_is_named_and_stays(finished: Path, name: str) -> None:
+def test_what_is_in_the_way_is_named_and_stays(finished, name):
     prepare, said = IN_THE_WAY[name]
     prepare(finished)
     before = files(finished.parent)
@@ -235,7 +231,7 @@ def test_what_is_in_the_way_is_named_and_stays(finished: Path, name: str) -> Non
     assert not (finished / "report").is_dir() or (finished / "report").is_symlink()
 
 
-def test_a_run_writes_through_no_link(suite: Workspace) -> None:
+def test_a_run_writes_through_no_link(suite):
     put(suite.root / "theirs")
     words = ("run", suite.root / "suite.yaml", "--out", suite.out)
     invoked(*words, "--no-report")
@@ -260,7 +256,7 @@ WRITING: dict[str, tuple[tuple[str, ...], str, str]] = {
 
 
 @pytest.mark.parametrize("verb", WRITING)
-def test_a_verb_writes_over_its_own_files_and_no_others(tmp_path: Path, verb: str) -> None:
+def test_a_verb_writes_over_its_own_files_and_no_others(tmp_path, verb):
     records = [
         record(model, scene, scores=[score(1, 1, 1)])
         for model in ("alpha", "beta")
@@ -291,7 +287,7 @@ def refused(workspace: Workspace, output: int, *words: str | bytes) -> tuple[int
     return done.returncode, done.stderr
 
 
-def test_output_that_nobody_takes_is_no_traceback(suite: Workspace) -> None:
+def test_output_that_nobody_takes_is_no_traceback(suite):
     with open("/dev/full", "wb") as full:
         code, said = refused(suite, full.fileno(), "models")
     assert (code, said) == (2, "error: output: cannot be used: No space left on device\n")
@@ -301,7 +297,7 @@ def test_output_that_nobody_takes_is_no_traceback(suite: Workspace) -> None:
     os.close(writer)
 
 
-def test_reports_that_are_written_at_once_all_come_to_their_end(finished: Path) -> None:
+def test_reports_that_are_written_at_once_all_come_to_their_end(finished):
     def write(_: int) -> Path:
         return write_report(write_tables(finished))
 
@@ -313,7 +309,7 @@ def test_reports_that_are_written_at_once_all_come_to_their_end(finished: Path) 
     assert f"report/{build.name}" in pages[0].read_text(encoding="utf-8")
 
 
-def test_init_writes_through_no_link(tmp_path: Path) -> None:
+def test_init_writes_through_no_link(tmp_path):
     (tmp_path / "new").mkdir()
     (tmp_path / "new" / "models.yaml").symlink_to(tmp_path / "elsewhere.yaml")
     with pytest.raises(StoreError, match=r"models\.yaml: is already there"):
@@ -321,7 +317,7 @@ def test_init_writes_through_no_link(tmp_path: Path) -> None:
     assert not (tmp_path / "elsewhere.yaml").exists()
 
 
-def test_a_run_goes_on_only_where_its_report_can_be_written(suite: Workspace) -> None:
+def test_a_run_goes_on_only_where_its_report_can_be_written(suite):
     words = ("run", suite.root / "suite.yaml", "--out", suite.out)
     invoked(*words, "--no-report")
     put(suite.out / "tables" / "mine.md")

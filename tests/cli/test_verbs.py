@@ -27,7 +27,7 @@ from tests.vqa_set import questions, vqa_suite, write_questions
 from tests.web.factory import LEVELS, manifest, record, score, write_run
 from tests.workspace import Workspace
 
-VERBS = tuple(phyblock.list_commands(None))  # type: ignore[arg-type]
+VERBS = tuple(phyblock.list_commands(None))
 CALLS = re.compile(rf"\bphyblock ((?:{'|'.join(VERBS)})\b[^\n`;|&>\"#]*)")
 LIBRARIES = tuple(ENGINES)
 HEAVY = ("litellm", *LIBRARIES, "pandas", "aiohttp", "matplotlib", "phyblock.making")
@@ -52,7 +52,7 @@ def ask(*commands: str) -> tuple[str, set[str]]:
     return done.stdout, set(done.stderr.split())
 
 
-def test_help_names_every_verb_and_imports_nothing_heavy() -> None:
+def test_help_names_every_verb_and_imports_nothing_heavy():
     told, imported = ask("--help")
     for verb in VERBS:
         assert f"\n  {verb} " in told
@@ -60,7 +60,7 @@ def test_help_names_every_verb_and_imports_nothing_heavy() -> None:
     assert not imported & {*HEAVY, "numpy", "pydantic", "rich", "yaml"}
 
 
-def test_help_of_verbs_and_version_import_nothing_heavy() -> None:
+def test_help_of_verbs_and_version_import_nothing_heavy():
     verbs = ("run", "report", "score", "validate", "models", "cache", "init")
     told, imported = ask("--version", *(f"{verb} --help" for verb in verbs))
     assert told.startswith("phyblock, version ")
@@ -69,7 +69,7 @@ def test_help_of_verbs_and_version_import_nothing_heavy() -> None:
     assert not imported & set(HEAVY)
 
 
-def test_every_option_that_messages_and_docs_name_is_there() -> None:
+def test_every_option_that_messages_and_docs_name_is_there():
     root = Path(__file__).parents[2]
     written = [*root.glob("phyblock*/**/*.py"), root / "README.md", *root.glob("docs/**/*.md")]
     named: set[tuple[str, ...]] = set()
@@ -92,7 +92,7 @@ def is_option(verb: str, *words: str) -> bool:
     return words[-1] in known | {"--help"}
 
 
-def test_a_call_that_may_cost_is_made_only_where_somebody_agrees(workspace: Workspace) -> None:
+def test_a_call_that_may_cost_is_made_only_where_somebody_agrees(workspace):
     with Running(OpenAIChat()) as running:
         workspace.write_models(running.url, "dear", price={"input": 1.0, "output": 1.0})
         refused = workspace.phyblock("models", "check", "dear", env={"CI": "1"})
@@ -105,7 +105,7 @@ def test_a_call_that_may_cost_is_made_only_where_somebody_agrees(workspace: Work
         assert running.server.requests == 2
 
 
-def test_missing_recordings_and_unknown_providers_are_found(workspace: Workspace) -> None:
+def test_missing_recordings_and_unknown_providers_are_found(workspace):
     models = {
         "far": {"replay": "./nowhere"},
         "odd": {"id": "opnai/gpt-4o", "groups": ["mine"]},
@@ -128,7 +128,7 @@ def test_missing_recordings_and_unknown_providers_are_found(workspace: Workspace
 @pytest.mark.parametrize(
     "model", ["hosted_vllm/x", "openai/new", "gemini/gemini-2.5-pro", "anthropic/claude-unheard-of"]
 )
-def test_a_model_at_hand_needs_no_litellm(model: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_model_at_hand_needs_no_litellm(model, monkeypatch):
     monkeypatch.setattr(litellm_client, "_litellm", lambda: pytest.fail("it was imported"))
     assert model.partition("/")[0] in known_providers(ModelConfig(name="m", id=model))
 
@@ -170,7 +170,7 @@ def played(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Work
     return workspace
 
 
-def test_an_episode_is_shown_step_by_step(played: Workspace) -> None:
+def test_an_episode_is_shown_step_by_step(played):
     endings = {r["seed"]: r["ending"] for r in played.records() if r["model"] == "oracle"}
     assert set(endings.values()) == {"completed", "collapsed"}
     fallen = next(seed for seed, ending in endings.items() if ending == "collapsed")
@@ -188,7 +188,7 @@ def test_an_episode_is_shown_step_by_step(played: Workspace) -> None:
         assert frames.convert("RGB").crop((262, 17, 390, 145)).tobytes() != before
 
 
-def test_a_film_tells_the_outcome_of_each_step_and_the_end(played: Workspace) -> None:
+def test_a_film_tells_the_outcome_of_each_step_and_the_end(played):
     (task,) = read_builtin(played.root / "data").tasks
     for episode in read_records(played.root / "out"):
         assert isinstance(episode, EpisodeRecord)
@@ -202,7 +202,7 @@ def test_a_film_tells_the_outcome_of_each_step_and_the_end(played: Workspace) ->
         assert last.caption.startswith(f"{episode.progress[-1]} of 3 blocks placed; ended: ")
 
 
-def test_a_plan_is_shown_from_its_prompt_to_its_verdicts(workspace: Workspace) -> None:
+def test_a_plan_is_shown_from_its_prompt_to_its_verdicts(workspace):
     with Running(OpenAIChat()) as running:
         workspace.write_models(running.url, "alpha")
         workspace.write_suite(models=["alpha"])
@@ -220,7 +220,7 @@ def test_a_plan_is_shown_from_its_prompt_to_its_verdicts(workspace: Workspace) -
     assert steps == [str(candidate) for candidate in shown["parse"]["plan"]]
 
 
-def test_an_answer_is_shown_with_the_right_one(workspace: Workspace) -> None:
+def test_an_answer_is_shown_with_the_right_one(workspace):
     write_questions(workspace.root / "questions", questions(per_subtask=2, subtasks=("SH", "CO")))
     workspace.write_suite(**vqa_suite())
     assert workspace.run("--models", "random").code == 0
@@ -247,7 +247,7 @@ def call(*words: str | Path) -> Result:
     return CliRunner().invoke(phyblock, [str(word) for word in words], catch_exceptions=False)
 
 
-def test_tables_print_all_or_one_in_any_form(folder: Path) -> None:
+def test_tables_print_all_or_one_in_any_form(folder):
     everything = call("report", folder, "--print").output
     for caption in ("Assembly planning", "Wrong steps by type", "Coverage", "Tokens, cost"):
         assert caption in everything
@@ -262,7 +262,7 @@ def test_tables_print_all_or_one_in_any_form(folder: Path) -> None:
     assert not (folder / "tables").exists()
 
 
-def test_compare_says_the_verdict(folder: Path, tmp_path: Path) -> None:
+def test_compare_says_the_verdict(folder, tmp_path):
     done = call("compare", folder, "--models", "alpha,beta", "--out", tmp_path / "out")
     # Five base scenes are too few for five comparisons.
     assert "cannot tell" in done.output
@@ -279,7 +279,7 @@ def test_compare_says_the_verdict(folder: Path, tmp_path: Path) -> None:
         call("compare", folder, tmp_path)
 
 
-def test_figures_and_exports_name_what_they_wrote(folder: Path) -> None:
+def test_figures_and_exports_name_what_they_wrote(folder):
     done = call("figures", folder, "--only", "errors")
     assert done.output.split() == [
         str(folder / "paper" / f"errors.{e}") for e in ("pdf", "svg", "png", "txt", "tex")

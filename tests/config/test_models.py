@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import json
 from pathlib import Path
-from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -36,14 +35,12 @@ def load(folder: Path, text: str) -> dict[str, ModelConfig]:
 
 
 @pytest.mark.parametrize("entry", BAD, ids=range(len(BAD)))
-def test_all_that_is_wrong_is_told_in_the_order_of_the_file(
-    tmp_path: Path, entry: dict[str, Any]
-) -> None:
+def test_all_that_is_wrong_is_told_in_the_order_of_the_file(tmp_path, entry):
     says = told(tmp_path, "models", entry["models"])
     assert says == entry["says"], "if this is meant: python -m tests.config.tables"
 
 
-def test_one_line_is_enough_and_a_mapping_says_more(tmp_path: Path) -> None:
+def test_one_line_is_enough_and_a_mapping_says_more(tmp_path):
     text = """
 gpt-4o: openai/gpt-4o-2024-08-06
 on: a/b
@@ -66,7 +63,7 @@ m:
     assert load(tmp_path, "# none yet\n") == {}
 
 
-def test_a_parameter_left_out_is_the_suites_and_null_is_not_sent(tmp_path: Path) -> None:
+def test_a_parameter_left_out_is_the_suites_and_null_is_not_sent(tmp_path):
     defaults = SamplingSpec(temperature=0.5, top_p=0.9, max_tokens=100).model_dump()
     models = load(tmp_path, "a: {id: x/y, temperature: null, max_tokens: 7}\nb: x/y\n")
     assert models["a"].with_defaults(defaults).params == {"top_p": 0.9, "max_tokens": 7}
@@ -88,9 +85,7 @@ OPTIONS = st.fixed_dictionaries(
 
 
 @given(options=st.dictionaries(st.from_regex(r"m[a-z0-9.-]{0,8}", fullmatch=True), OPTIONS))
-def test_a_dumped_file_loads_equal(
-    tmp_path_factory: pytest.TempPathFactory, options: dict[str, dict[str, object]]
-) -> None:
+def test_a_dumped_file_loads_equal(tmp_path_factory, options):
     folder = tmp_path_factory.getbasetemp()
     models = load(folder, json.dumps(options))
     dump = {"mode": "json", "exclude_unset": True, "by_alias": True}
@@ -100,9 +95,7 @@ def test_a_dumped_file_loads_equal(
 
 @settings(deadline=None, max_examples=40)
 @given(data=MODELS_FILES)
-def test_any_models_file_is_read_or_refused(
-    data: bytes, tmp_path_factory: pytest.TempPathFactory
-) -> None:
+def test_any_models_file_is_read_or_refused(data, tmp_path_factory):
     path = tmp_path_factory.getbasetemp() / "law-models.yaml"
     path.write_bytes(data)
     with contextlib.suppress(SpecError):
@@ -113,7 +106,7 @@ def test_any_models_file_is_read_or_refused(
 GROUPED = "b: {id: x/b, groups: [big, all]}\na: {id: x/a, groups: [all]}\nc: x/c\n"
 
 
-def test_names_and_groups_stand_for_models_in_the_order_of_the_file(tmp_path: Path) -> None:
+def test_names_and_groups_stand_for_models_in_the_order_of_the_file(tmp_path):
     known = load(tmp_path, GROUPED)
     found = resolve_models(["oracle", "group:all", "a", "c", "group:big"], known, str)
     assert list(found) == ["oracle", "b", "a", "c"]
@@ -151,9 +144,7 @@ PLACES = [
 
 @pytest.mark.parametrize("secret", SECRETS)
 @pytest.mark.parametrize("place", PLACES)
-def test_a_key_in_the_file_is_refused_and_not_repeated(
-    tmp_path: Path, place: str, secret: str
-) -> None:
+def test_a_key_in_the_file_is_refused_and_not_repeated(tmp_path, place, secret):
     says = told(tmp_path, "models", place.replace("SECRET", secret))
     assert "looks like a key" in says
     assert "api_key_env" in says
@@ -161,7 +152,7 @@ def test_a_key_in_the_file_is_refused_and_not_repeated(
 
 
 @pytest.mark.parametrize("model_id", ["openai/task-abc-def", "azure/risk-big", "a/disk-12345678"])
-def test_ordinary_names_are_not_taken_for_keys(tmp_path: Path, model_id: str) -> None:
+def test_ordinary_names_are_not_taken_for_keys(tmp_path, model_id):
     assert load(tmp_path, f"m: {model_id}\n")["m"].id == model_id
 
 
@@ -210,14 +201,12 @@ MALFORMED = [
 
 
 @pytest.mark.parametrize("url", GOOD)
-def test_an_address_is_one(url: str) -> None:
+def test_an_address_is_one(url):
     assert is_address(url)
 
 
 @pytest.mark.parametrize("url", [*SECRETIVE, *MALFORMED])
-def test_what_is_none_is_refused_without_being_shown(
-    url: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_what_is_none_is_refused_without_being_shown(url, monkeypatch, tmp_path):
     assert not is_address(url)
     if url and "\x00" not in url and "\ud800" not in url:
         says = told(tmp_path, "models", f"m: {{id: openai/m, api_base: {json.dumps(url)}}}\n")
@@ -230,18 +219,18 @@ def test_what_is_none_is_refused_without_being_shown(
 
 
 @given(st.text(min_size=1), st.text(), st.sampled_from(["http", "https"]))
-def test_no_user_gets_through(user: str, rest: str, scheme: str) -> None:
+def test_no_user_gets_through(user, rest, scheme):
     url = f"{scheme}://{user.translate({ord(c): 'x' for c in '/?#'})}@host/{rest}"
     assert not is_address(url)
 
 
 @given(st.text())
-def test_any_text_is_an_address_or_refused(url: str) -> None:
+def test_any_text_is_an_address_or_refused(url):
     assert not is_address(url) or url.lower().startswith(("http://", "https://"))
     assert "/" not in host_of(url)
 
 
-def test_a_host_is_shown_without_what_stands_around_it() -> None:
+def test_a_host_is_shown_without_what_stands_around_it():
     assert host_of(f"https://me:{SECRET}@host:8443/v1?key={SECRET}#x") == "host:8443"
     assert host_of("http://[::1]:80/v1") == "[::1]:80"
     assert host_of("http://[::1/v1") == host_of("/v1") == "an unreadable address"

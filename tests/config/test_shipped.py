@@ -40,7 +40,7 @@ GPT-4.1, GPT-o3, Qwen2.5-VL-72B-Instruct, Cosmos-Reason1-7B
 
 
 @pytest.mark.parametrize("path", [*SUITES, ROOT / "models.yaml"], ids=lambda path: path.name)
-def test_a_shipped_file_is_valid_by_the_schema_it_names(path: Path) -> None:
+def test_a_shipped_file_is_valid_by_the_schema_it_names(path):
     stamp = STAMP.match(path.read_text(encoding="utf-8"))
     assert stamp is not None
     schema = json.loads((path.parent / stamp[1]).read_text(encoding="utf-8"))
@@ -49,7 +49,7 @@ def test_a_shipped_file_is_valid_by_the_schema_it_names(path: Path) -> None:
 
 
 @pytest.mark.parametrize("path", SUITES, ids=lambda path: path.stem)
-def test_a_shipped_suite_loads_and_its_models_are_known(path: Path, tmp_path: Path) -> None:
+def test_a_shipped_suite_loads_and_its_models_are_known(path, tmp_path):
     overrides = [f"dataset.path={tmp_path}"] if path.stem in OFFICIAL_ONLY else []
     loaded = load_suite(path, overrides)
     assert loaded.name == path.stem
@@ -59,7 +59,7 @@ def test_a_shipped_suite_loads_and_its_models_are_known(path: Path, tmp_path: Pa
 
 
 @pytest.mark.parametrize("name", sorted(OFFICIAL_ONLY))
-def test_an_official_suite_without_data_says_how_to_set_it(name: str) -> None:
+def test_an_official_suite_without_data_says_how_to_set_it(name):
     with pytest.raises(SpecError) as caught:
         load_suite(ROOT / "benchmarks" / f"{name}.yaml")
     (problem,) = caught.value.problems
@@ -67,7 +67,7 @@ def test_an_official_suite_without_data_says_how_to_set_it(name: str) -> None:
     assert "--set dataset.path=FOLDER" in problem.hint
 
 
-def test_the_list_is_that_of_the_papers_tables(official_dir: Path) -> None:
+def test_the_list_is_that_of_the_papers_tables(official_dir):
     named = {name.strip() for name in PUBLISHED.split(",")}
     tables = sorted((official_dir / "paper").glob("table*.csv"))
     assert tables
@@ -92,7 +92,7 @@ print(json.dumps(refused))
 
 
 @pytest.mark.slow
-def test_litellm_takes_the_parameters_of_every_model() -> None:
+def test_litellm_takes_the_parameters_of_every_model():
     calls = {}
     for name, spec in load_models(ROOT / "models.yaml").items():
         assert spec.id is not None
@@ -115,7 +115,7 @@ SUITE = Draft202012Validator(MADE["suite.schema.json"])
 MODELS = Draft202012Validator(MADE["models.schema.json"])
 
 
-def test_the_committed_schemas_are_those_of_the_models(tmp_path: Path) -> None:
+def test_the_committed_schemas_are_those_of_the_models(tmp_path):
     made = [sys.executable, "-m", "tests.documents", str(tmp_path)]
     subprocess.run(made, check=True, cwd=ROOT)
     for name, schema in MADE.items():
@@ -132,7 +132,7 @@ def _properties(schema: Any) -> list[tuple[str, dict[str, Any]]]:
 
 
 @pytest.mark.parametrize("schema", MADE.values(), ids=MADE)
-def test_every_key_is_described(schema: dict[str, Any]) -> None:
+def test_every_key_is_described(schema):
     told = {
         f"#/$defs/{name}"
         for name, part in schema.get("$defs", {}).items()
@@ -147,7 +147,7 @@ def test_every_key_is_described(schema: dict[str, Any]) -> None:
 
 
 @given(raw=DRAWN)
-def test_valid_suites_are_valid_by_the_schema(raw: dict[str, Any]) -> None:
+def test_valid_suites_are_valid_by_the_schema(raw):
     assert SUITE.is_valid(raw)
     assert SUITE.is_valid(SUITE_MODEL.model_validate(raw).model_dump(mode="json"))
 
@@ -173,7 +173,7 @@ BROKEN = [
 
 
 @pytest.mark.parametrize(("key", "value"), BROKEN)
-def test_what_the_reader_refuses_the_schema_refuses(key: str, value: object) -> None:
+def test_what_the_reader_refuses_the_schema_refuses(key, value):
     good = {"name": "s", "models": ["oracle"]}
     assert SUITE.is_valid(good)
     bad = {**good, key: value}
@@ -198,7 +198,7 @@ def test_what_the_reader_refuses_the_schema_refuses(key: str, value: object) -> 
         (5, False),
     ],
 )
-def test_models_by_the_schema_and_by_the_reader(tmp_path: Path, entry: Any, good: bool) -> None:
+def test_models_by_the_schema_and_by_the_reader(tmp_path, entry, good):
     assert MODELS.is_valid({"m": entry}) is good
     assert not any(MODELS.is_valid({name: entry}) for name in ("a b", ""))
     path = tmp_path / "m.yaml"

@@ -32,15 +32,13 @@ JARGON = r"pydantic|Input should|valid (dictionary|tuple|string)|_type\b|extra_f
 
 
 @pytest.mark.parametrize("entry", BAD, ids=range(len(BAD)))
-def test_all_that_is_wrong_is_told_in_the_order_of_the_file(
-    tmp_path: Path, entry: dict[str, Any]
-) -> None:
+def test_all_that_is_wrong_is_told_in_the_order_of_the_file(tmp_path, entry):
     says = told(tmp_path, "suite", entry["suite"], entry.get("set", ()))
     assert says == entry["says"], "if this is meant: python -m tests.config.tables"
     assert not re.search(JARGON, says)
 
 
-def test_many_problems_are_reported_in_part(tmp_path: Path) -> None:
+def test_many_problems_are_reported_in_part(tmp_path):
     says = told(tmp_path, "suite", HEAD + "".join(f"sede{i}: 1\n" for i in range(3_000)))
     assert says.count("is not a known key") == 100
     text = HEAD + "? " + "k" * 90_000 + "\n: 1\n"
@@ -63,7 +61,7 @@ def load(folder: Path, text: str, *overrides: str) -> Suite:
 
 
 @given(raw=SUITES)
-def test_a_dumped_suite_loads_equal(folder: Path, raw: dict[str, Any]) -> None:
+def test_a_dumped_suite_loads_equal(folder, raw):
     suite = SUITE_MODEL.model_validate(raw)
     dumped = suite.model_dump(mode="json")
     for text in (dump_yaml(dumped), json.dumps(dumped), json.dumps(raw)):
@@ -71,9 +69,7 @@ def test_a_dumped_suite_loads_equal(folder: Path, raw: dict[str, Any]) -> None:
 
 
 @given(raw=SUITES, data=st.data())
-def test_identity_is_json_without_bounds_places_and_order(
-    raw: dict[str, Any], data: st.DataObject
-) -> None:
+def test_identity_is_json_without_bounds_places_and_order(raw, data):
     identity = SUITE_MODEL.model_validate(raw).identity()
     json.dumps(identity, allow_nan=False)
     shuffled = {
@@ -111,9 +107,7 @@ def outcome(folder: Path, raw: dict[str, Any], *overrides: str) -> object:
 
 
 @given(raw=SUITES, changes=CHANGES)
-def test_overrides_equal_editing_the_file(
-    folder: Path, raw: dict[str, Any], changes: dict[str, Any]
-) -> None:
+def test_overrides_equal_editing_the_file(folder, raw, changes):
     edited = copy.deepcopy(raw)
     for key, value in changes.items():
         section, _, name = key.rpartition(".")
@@ -122,9 +116,7 @@ def test_overrides_equal_editing_the_file(
     assert outcome(folder, raw, *texts) == outcome(folder, edited)
 
 
-def test_paths_start_at_the_file_or_for_overrides_at_the_working_directory(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_paths_start_at_the_file_or_for_overrides_at_the_working_directory(folder, monkeypatch):
     monkeypatch.setenv("PHYBLOCK_TEST_ROOT", str(folder))
     monkeypatch.setenv("HOME", str(folder))
     official = "dataset.format=official"
@@ -144,7 +136,7 @@ def test_paths_start_at_the_file_or_for_overrides_at_the_working_directory(
     assert load(folder, HEAD, "seeds=[1]", "seeds=[2]", "levels=[1]").seeds == (2,)
 
 
-def test_a_suite_made_in_python_obeys_the_rules_between_fields() -> None:
+def test_a_suite_made_in_python_obeys_the_rules_between_fields():
     with pytest.raises(ValidationError, match="only the official data set has recorded replies"):
         SUITE_MODEL.model_validate({"name": "s", "models": "recorded"})
 
@@ -169,9 +161,7 @@ VARIED = st.fixed_dictionaries(
 
 
 @given(section=VARIED)
-def test_variants_are_all_choices_once_and_the_reference_is_the_first(
-    section: dict[str, Any],
-) -> None:
+def test_variants_are_all_choices_once_and_the_reference_is_the_first(section):
     vary = VarySpec.model_validate({name: found for name, found in section.items() if found})
     shown = [len(section[name]) or 1 for name in FACTORS if name != REPEAT]
     keys = [variant.key for variant in vary.variants]
@@ -181,7 +171,7 @@ def test_variants_are_all_choices_once_and_the_reference_is_the_first(
     assert {one.shown.key for one in vary.variants} <= set(keys)
 
 
-def test_a_variant_is_the_suite_with_other_values_in_its_fields(folder: Path) -> None:
+def test_a_variant_is_the_suite_with_other_values_in_its_fields(folder):
     text = HEAD + (
         "vary:\n  background: [lawn, white]\n  candidate_order: [file, shuffled]\n"
         "  prompt: [brief.j2, default]\n  repeats: 2\n"
@@ -199,7 +189,7 @@ def test_a_variant_is_the_suite_with_other_values_in_its_fields(folder: Path) ->
 
 @settings(deadline=None, max_examples=40)
 @given(data=ANY_SUITES, override=st.none() | OVERRIDE_TEXTS)
-def test_any_suite_is_read_or_refused(folder: Path, data: bytes, override: str | None) -> None:
+def test_any_suite_is_read_or_refused(folder, data, override):
     (folder / "law.yaml").write_bytes(data)
     with contextlib.suppress(SpecError):
         overrides = () if override is None else (override,)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -34,7 +33,7 @@ def values(texts: st.SearchStrategy[str]) -> st.SearchStrategy[object]:
 
 
 @pytest.mark.parametrize(("text", "value"), SCALARS.items())
-def test_scalars_follow_yaml_1_2_and_keys_are_text_as_written(text: str, value: object) -> None:
+def test_scalars_follow_yaml_1_2_and_keys_are_text_as_written(text, value):
     found = parse_yaml(f"[a, {text}]", "x").data[1]
     assert (found, type(found)) == (value, type(value))
     if text.isalnum():
@@ -42,16 +41,16 @@ def test_scalars_follow_yaml_1_2_and_keys_are_text_as_written(text: str, value: 
 
 
 @given(values(TEXT))
-def test_json_is_read_as_json(value: object) -> None:
+def test_json_is_read_as_json(value):
     assert parse_yaml(json.dumps(value), "x").data == value
 
 
 @given(values(TEXT | st.sampled_from(list(SCALARS))))
-def test_what_is_dumped_is_read_again(value: object) -> None:
+def test_what_is_dumped_is_read_again(value):
     assert parse_yaml(dump_yaml(value), "x").data == value
 
 
-def test_places_of_keys_and_values() -> None:
+def test_places_of_keys_and_values():
     source = parse_yaml("a: 1\nb:\n  - x\n  - {c: 2}\n", "f.yaml")
     assert source.where(("a",), key=True) == "f.yaml:1:1"
     assert source.where(("a",)) == "f.yaml:1:4"
@@ -63,7 +62,7 @@ def test_places_of_keys_and_values() -> None:
     assert dotted(("images", "order", 1, "x")) == "images.order[1].x"
 
 
-def test_anchors() -> None:
+def test_anchors():
     source = parse_yaml("base: &b {x: 1, y: 2}\nsame: *b\n", "f")
     assert source.data["same"] == source.data["base"] == {"x": 1, "y": 2}
 
@@ -103,9 +102,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize(("text", "said"), REFUSED.items(), ids=range(len(REFUSED)))
-def test_what_is_not_plain_data_or_too_much_is_one_problem_at_its_place(
-    text: str, said: str
-) -> None:
+def test_what_is_not_plain_data_or_too_much_is_one_problem_at_its_place(text, said):
     with pytest.raises(SpecError) as caught:
         parse_yaml(text, "f")
     (problem,) = caught.value.problems
@@ -113,7 +110,7 @@ def test_what_is_not_plain_data_or_too_much_is_one_problem_at_its_place(
 
 
 @given(st.text())
-def test_any_text_is_read_or_refused(text: str) -> None:
+def test_any_text_is_read_or_refused(text):
     try:
         places = [parse_yaml(text, "f").where(())]
     except SpecError as error:
@@ -121,7 +118,7 @@ def test_any_text_is_read_or_refused(text: str) -> None:
     assert all(place.startswith("f") for place in places)
 
 
-def test_files_that_cannot_be_read(tmp_path: Path) -> None:
+def test_files_that_cannot_be_read(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "big").write_bytes(b"a: 1\n" * 200_000)
     (tmp_path / "latin").write_bytes(b"a: 1\nb: \xff\n")
@@ -142,7 +139,7 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "text", ["-eyJ" * 50_000, "http://" + ":" * 200_000, "bearer " * 30_000, "hf" * 90_000]
 )
-def test_a_search_for_keys_takes_linear_time(text: str) -> None:
+def test_a_search_for_keys_takes_linear_time(text):
     assert not looks_secret(text)
 
 
@@ -151,7 +148,7 @@ def test_a_search_for_keys_takes_linear_time(text: str) -> None:
     [10**6000, {object(): 1}, {(1, 2): 3}, b"x", "\ud800", {"a": {1, 2}}, "x" * 10**6],
     ids=lambda value: type(value).__name__,
 )
-def test_any_value_can_be_shown(value: object) -> None:
+def test_any_value_can_be_shown(value):
     text = shown(value)
     assert len(text) <= 80
     text.encode()

@@ -51,13 +51,13 @@ def change(path: Path, field: str, value: object) -> None:
     path.write_text(json.dumps(changed), encoding="utf-8")
 
 
-def test_both_formats_say_the_same(tmp_path: Path) -> None:
+def test_both_formats_say_the_same(tmp_path):
     official = read_official(write_checkout(tmp_path, SCENE))
     assert official.tasks == read_builtin(write_scenes(tmp_path, SCENE)).tasks
     assert official.name == "official"
 
 
-def test_what_only_official_files_have_is_read(tmp_path: Path) -> None:
+def test_what_only_official_files_have_is_read(tmp_path):
     (task,) = read_official(write_checkout(tmp_path, SCENE)).tasks
     assert (task.scene.look_at_m, task.composite, task.scene.parents) == (None, None, ("s1",))
     # A level-2 scene counts in level 1 too; declared layers are taken as they are.
@@ -94,7 +94,7 @@ BROKEN_CANDIDATES: dict[str, tuple[str, object, str, str]] = {
 
 
 @pytest.mark.parametrize("name", [*BROKEN_GOALS, *BROKEN_CANDIDATES])
-def test_what_is_broken_is_named_with_file_and_field(tmp_path: Path, name: str) -> None:
+def test_what_is_broken_is_named_with_file_and_field(tmp_path, name):
     write_checkout(tmp_path, SCENE)
     file = goal_path(tmp_path) if name in BROKEN_GOALS else candidates_path(tmp_path)
     path, value, field, message = (BROKEN_GOALS | BROKEN_CANDIDATES)[name]
@@ -104,7 +104,7 @@ def test_what_is_broken_is_named_with_file_and_field(tmp_path: Path, name: str) 
     assert message in problem.message
 
 
-def test_what_is_wrong_in_every_scene_is_said_at_once(tmp_path: Path) -> None:
+def test_what_is_wrong_in_every_scene_is_said_at_once(tmp_path):
     write_checkout(tmp_path, SCENE, {**SCENE, "id": "s2"}, {**SCENE, "id": "s3"})
     goals = goal_path(tmp_path).parent
     candidates_path(tmp_path).unlink()
@@ -117,7 +117,7 @@ def test_what_is_wrong_in_every_scene_is_said_at_once(tmp_path: Path) -> None:
     assert "not a name" in name.message
 
 
-def test_a_folder_without_scenes_is_no_checkout(tmp_path: Path) -> None:
+def test_a_folder_without_scenes_is_no_checkout(tmp_path):
     (problem,) = problems_of(tmp_path)
     assert problem.where == str(tmp_path)
     assert "checkout" in problem.allowed
@@ -129,7 +129,7 @@ def record(root: Path, model: str, scene: str, raw: object) -> None:
     (folder / f"{scene}.json").write_text(json.dumps(raw), encoding="utf-8")
 
 
-def test_recorded_models_are_the_folders_that_hold_replies(tmp_path: Path) -> None:
+def test_recorded_models_are_the_folders_that_hold_replies(tmp_path):
     with pytest.raises(DataError, match="holds no recorded replies"):
         recorded_models(tmp_path)
     (tmp_path / "outputs" / "empty").mkdir(parents=True)
@@ -140,7 +140,7 @@ def test_recorded_models_are_the_folders_that_hold_replies(tmp_path: Path) -> No
     assert list(recorded_models(tmp_path)) == ["a", "b"]
 
 
-def test_the_official_prompt_is_what_most_recordings_carry(tmp_path: Path) -> None:
+def test_the_official_prompt_is_what_most_recordings_carry(tmp_path):
     record(tmp_path, "plain", "000", {"choices": []})
     with pytest.raises(DataError, match="no recording carries the official prompt"):
         official_prompt(tmp_path)
@@ -154,7 +154,7 @@ def test_the_official_prompt_is_what_most_recordings_carry(tmp_path: Path) -> No
         official_prompt(tmp_path)
 
 
-def test_the_official_scenes(official_checkout: Path) -> None:
+def test_the_official_scenes(official_checkout):
     tasks = read_official(official_checkout).tasks
     assert len(tasks) == 400
     assert [task.scene.id for task in tasks] == [f"{i:03}" for i in range(400)]
@@ -209,7 +209,7 @@ def problems(folder: Path, scenes: Dataset) -> list[str]:
     return [str(problem) for problem in caught.value.problems]
 
 
-def test_texts_pictures_and_orders_are_read(tmp_path: Path, scenes: Dataset) -> None:
+def test_texts_pictures_and_orders_are_read(tmp_path, scenes):
     write(tmp_path, "color.json", [COLOR, {**COLOR, "id": "mine", "answer": "blue"}])
     write(tmp_path, "PD.json", [NEXT])
     write(tmp_path, "Ordering.json", [{**NEXT, "answer": "CABD"}])
@@ -239,9 +239,7 @@ FAULTS = [
 
 
 @pytest.mark.parametrize(("change", "message"), FAULTS)
-def test_each_fault_is_one_error_with_file_and_place(
-    tmp_path: Path, scenes: Dataset, change: Raw, message: str
-) -> None:
+def test_each_fault_is_one_error_with_file_and_place(tmp_path, scenes, change, message):
     write(tmp_path, "CO.json", [COLOR, {**COLOR, **change}])
     (problem,) = problems(tmp_path, scenes)
     assert problem.startswith(f"{tmp_path / 'CO.json'}[1]: {message}")
@@ -259,9 +257,7 @@ def test_each_fault_is_one_error_with_file_and_place(
         ("CO.json", [{**COLOR, "answer": 2}], "has the wrong type"),
     ],
 )
-def test_files_that_are_no_questions_are_said(
-    tmp_path: Path, scenes: Dataset, name: str, content: object, message: str
-) -> None:
+def test_files_that_are_no_questions_are_said(tmp_path, scenes, name, content, message):
     write(tmp_path, name, content)
     assert any(message in problem for problem in problems(tmp_path, scenes))
 
@@ -299,12 +295,12 @@ ROWS = [*dict.fromkeys([*published_table(1)["model"], *published_table(2)["model
 
 
 @pytest.mark.parametrize(("name", "published"), [*SPELLINGS.items(), *zip(ROWS, ROWS, strict=True)])
-def test_known_spellings(name: str, published: str) -> None:
+def test_known_spellings(name, published):
     assert match_published(name) == published
 
 
 @pytest.mark.parametrize("name", OTHERS)
-def test_other_models_are_not_taken_for_published_ones(name: str) -> None:
+def test_other_models_are_not_taken_for_published_ones(name):
     assert match_published(name) is None
 
 
@@ -317,12 +313,12 @@ dates = st.dates(date(2020, 1, 1), date(2030, 12, 31))
     dates,
     st.sampled_from(["%Y-%m-%d", "%Y%m%d", "%Y_%m_%d", "%m-%d", "%m%d"]),
 )
-def test_a_release_date_changes_nothing(name: str, day: date, form: str) -> None:
+def test_a_release_date_changes_nothing(name, day, form):
     assert match_published(f"{name}-{day:{form}}") == name
 
 
 @given(names, st.data())
-def test_case_and_separators_change_nothing(name: str, data: st.DataObject) -> None:
+def test_case_and_separators_change_nothing(name, data):
     bare = name.rpartition("/")[2]
     other = "".join(
         data.draw(st.sampled_from("-_. ")) if char in "-_. " else data.draw(_cases(char))
@@ -336,12 +332,12 @@ def _cases(char: str) -> st.SearchStrategy[str]:
 
 
 @given(names, st.from_regex(r"[a-z]{2,9}", fullmatch=True))
-def test_an_unknown_word_makes_it_another_model(name: str, word: str) -> None:
+def test_an_unknown_word_makes_it_another_model(name, word):
     known = {"mini", "thinking", "lite", "latest", "preview", "exp", "instruct", "ov", "hf"}
     if word not in known:
         assert match_published(f"{name}-{word}") is None
 
 
 @given(st.text(max_size=40))
-def test_any_text_is_a_published_name_or_unknown(name: str) -> None:
+def test_any_text_is_a_published_name_or_unknown(name):
     assert match_published(name) in {None, *ROWS}

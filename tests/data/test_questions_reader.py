@@ -53,7 +53,7 @@ def read_one(folder: Path, scenes: Dataset, question: Any) -> QuestionTask:
     return task
 
 
-def test_a_sound_question_is_read(tmp_path: Path, scenes: Dataset) -> None:
+def test_a_sound_question_is_read(tmp_path, scenes):
     task = read_one(tmp_path / "q", scenes, QUESTION)
     question = task.question
     assert (task.key, question.answer, question.answer_letters) == ("co-001", (1,), "B")
@@ -63,9 +63,7 @@ def test_a_sound_question_is_read(tmp_path: Path, scenes: Dataset) -> None:
     assert not task.files
 
 
-def test_a_picture_is_the_scene_but_for_what_its_recipe_says(
-    tmp_path: Path, scenes: Dataset
-) -> None:
+def test_a_picture_is_the_scene_but_for_what_its_recipe_says(tmp_path, scenes):
     added = sound_scene()["blocks"][0] | {"order": 9, "position": [0.2, 0, 0.025]}
     recipe = {
         "label": "scene",
@@ -89,7 +87,7 @@ def test_a_picture_is_the_scene_but_for_what_its_recipe_says(
     assert picture.framed == task.scene.blocks
 
 
-def test_an_order_is_read_as_four_indices(tmp_path: Path, scenes: Dataset) -> None:
+def test_an_order_is_read_as_four_indices(tmp_path, scenes):
     pictures = [{"label": letter, "view": [45, 22]} for letter in "ABCD"]
     options = [f"<img{i}>" for i in range(1, 5)]
     changes = {"subtask": "OR", "category": "dynamic_reasoning", "options": options}
@@ -151,9 +149,7 @@ BROKEN_PICTURES = {
 
 
 @pytest.mark.parametrize(("change", "field", "found"), BROKEN.values(), ids=BROKEN)
-def test_what_is_wrong_is_named_with_its_line(
-    tmp_path: Path, scenes: Dataset, change: dict[str, Any], field: str, found: str
-) -> None:
+def test_what_is_wrong_is_named_with_its_line(tmp_path, scenes, change, field, found):
     folder = write(tmp_path / "q", QUESTION, QUESTION | {"id": "co-002"} | change)
     with pytest.raises(DataError) as caught:
         read_questions(folder, scenes)
@@ -165,9 +161,7 @@ def test_what_is_wrong_is_named_with_its_line(
 @pytest.mark.parametrize(
     ("change", "field", "found"), BROKEN_PICTURES.values(), ids=BROKEN_PICTURES
 )
-def test_what_is_wrong_in_a_picture_is_named(
-    tmp_path: Path, scenes: Dataset, change: dict[str, Any], field: str, found: str | None
-) -> None:
+def test_what_is_wrong_in_a_picture_is_named(tmp_path, scenes, change, field, found):
     question = copy.deepcopy(QUESTION)
     question["pictures"][0] |= change
     with pytest.raises(DataError) as caught:
@@ -177,19 +171,19 @@ def test_what_is_wrong_in_a_picture_is_named(
     assert found in (None, problem.found)
 
 
-def test_a_number_that_is_used_twice_is_told(tmp_path: Path, scenes: Dataset) -> None:
+def test_a_number_that_is_used_twice_is_told(tmp_path, scenes):
     folder = write(tmp_path / "q", QUESTION, QUESTION | {"id": "co-002"}, QUESTION)
     with pytest.raises(DataError, match=r"questions.jsonl:3: id: is used at .*:1 already"):
         read_questions(folder, scenes)
 
 
 @pytest.mark.parametrize("field", ["id", "subtask", "scene_id", "question", "options", "answer"])
-def test_a_missing_field_is_told(tmp_path: Path, scenes: Dataset, field: str) -> None:
+def test_a_missing_field_is_told(tmp_path, scenes, field):
     with pytest.raises(DataError, match=rf"questions.jsonl:1: {field}: is missing"):
         read_questions(write(tmp_path / "q", without(QUESTION, field)), scenes)
 
 
-def test_an_empty_file_and_no_file_are_told(tmp_path: Path, scenes: Dataset) -> None:
+def test_an_empty_file_and_no_file_are_told(tmp_path, scenes):
     with pytest.raises(DataError, match="holds no questions"):
         read_questions(write(tmp_path / "q"), scenes)
     with pytest.raises(DataError, match=r"a folder with questions\.jsonl"):
@@ -208,9 +202,7 @@ def test_an_empty_file_and_no_file_are_told(tmp_path: Path, scenes: Dataset) -> 
         ("wording", "co-2"),
     ],
 )
-def test_the_digest_of_a_set_follows_every_field(
-    tmp_path: Path, scenes: Dataset, field: str, value: Any
-) -> None:
+def test_the_digest_of_a_set_follows_every_field(tmp_path, scenes, field, value):
     digests = [
         read_questions(write(tmp_path / name, question), scenes).sha256
         for name, question in (("a", QUESTION), ("b", QUESTION), ("c", {**QUESTION, field: value}))
@@ -218,7 +210,7 @@ def test_the_digest_of_a_set_follows_every_field(
     assert digests[0] == digests[1] != digests[2]
 
 
-def test_questions_about_another_data_set_are_said_once(tmp_path: Path, scenes: Dataset) -> None:
+def test_questions_about_another_data_set_are_said_once(tmp_path, scenes):
     others = [{**QUESTION, "id": f"co-{n}", "scene_id": f"far-{n}"} for n in range(30)]
     folder = write(tmp_path / "q", QUESTION, *others)
     with pytest.raises(DataError) as caught:
@@ -232,7 +224,7 @@ def test_questions_about_another_data_set_are_said_once(tmp_path: Path, scenes: 
     assert len(caught.value.problems) == 5
 
 
-def test_the_complaints_of_one_line_are_bounded(tmp_path: Path, scenes: Dataset) -> None:
+def test_the_complaints_of_one_line_are_bounded(tmp_path, scenes):
     question = copy.deepcopy(QUESTION)
     question["pictures"][0]["without"] = [9] * 20
     question.update({f"field{i}": [0] * 20 for i in range(5_000)})
@@ -241,16 +233,14 @@ def test_the_complaints_of_one_line_are_bounded(tmp_path: Path, scenes: Dataset)
     assert len(caught.value.problems) == 100
 
 
-def test_a_whole_character_in_two_escapes_is_fine(tmp_path: Path, scenes: Dataset) -> None:
+def test_a_whole_character_in_two_escapes_is_fine(tmp_path, scenes):
     text = "How many \U0001f9f1?"
     assert read_one(tmp_path / "q", scenes, QUESTION | {"question": text}).question.text == text
 
 
 @settings(deadline=None, max_examples=40)
 @given(QUESTIONS)
-def test_any_question_is_read_or_refused(
-    tmp_path_factory: pytest.TempPathFactory, line: bytes
-) -> None:
+def test_any_question_is_read_or_refused(tmp_path_factory, line):
     folder = tmp_path_factory.getbasetemp()
     scenes = read_builtin(write_scenes(folder, tower("t1", [1, 2], ("red", "blue"))))
     (folder / "questions.jsonl").write_bytes(line)

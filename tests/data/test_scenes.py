@@ -39,7 +39,7 @@ def problems_of(folder: Path) -> tuple[Problem, ...]:
     return caught.value.problems
 
 
-def test_a_sound_scene_is_read(tmp_path: Path) -> None:
+def test_a_sound_scene_is_read(tmp_path):
     dataset = read_builtin(write_scenes(tmp_path, SCENE))
     (task,) = dataset.tasks
     assert dataset.name == tmp_path.name
@@ -56,7 +56,7 @@ def test_a_sound_scene_is_read(tmp_path: Path) -> None:
     assert task.candidates[3] == Candidate("arch", "red", (0, 0, 90))
 
 
-def test_scenes_come_in_id_order_whatever_their_lines(tmp_path: Path) -> None:
+def test_scenes_come_in_id_order_whatever_their_lines(tmp_path):
     scenes = [{**SCENE, "id": name} for name in ("c", "a", "b")]
     dataset = read_builtin(write_scenes(tmp_path, *scenes))
     assert [task.scene.id for task in dataset.tasks] == ["a", "b", "c"]
@@ -64,7 +64,7 @@ def test_scenes_come_in_id_order_whatever_their_lines(tmp_path: Path) -> None:
     assert read_builtin(write_scenes(tmp_path, *scenes[:2])).sha256 != dataset.sha256
 
 
-def test_the_digest_tells_scenes_apart_but_not_spellings_of_one(tmp_path: Path) -> None:
+def test_the_digest_tells_scenes_apart_but_not_spellings_of_one(tmp_path):
     def digest(scene: Raw) -> str:
         return read_builtin(write_scenes(tmp_path, scene)).sha256
 
@@ -75,7 +75,7 @@ def test_the_digest_tells_scenes_apart_but_not_spellings_of_one(tmp_path: Path) 
     assert len({digest(SCENE), digest(moved), digest(turned)}) == 3
 
 
-def test_orientation_is_read_as_euler(tmp_path: Path) -> None:
+def test_orientation_is_read_as_euler(tmp_path):
     blocks = [
         {**{k: v for k, v in block.items() if k != "euler"}, "orientation": block["euler"]}
         for block in SCENE["blocks"]
@@ -84,7 +84,7 @@ def test_orientation_is_read_as_euler(tmp_path: Path) -> None:
     assert renamed.tasks == read_builtin(write_scenes(tmp_path, SCENE)).tasks
 
 
-def test_line_ends_of_any_kind_and_a_missing_last_one_are_read(tmp_path: Path) -> None:
+def test_line_ends_of_any_kind_and_a_missing_last_one_are_read(tmp_path):
     # Unicode's own line ends inside a string end no line.
     scenes = [{**SCENE, "id": name, "note": "a\u2028b\x85c"} for name in "ab"]
     lines = [json.dumps(scene, ensure_ascii=False) for scene in scenes]
@@ -138,7 +138,7 @@ BROKEN_VALUES: dict[str, tuple[str, object, str]] = {
 
 
 @pytest.mark.parametrize("name", BROKEN_VALUES)
-def test_a_broken_value_is_named_with_file_line_and_field(tmp_path: Path, name: str) -> None:
+def test_a_broken_value_is_named_with_file_line_and_field(tmp_path, name):
     path, value, field = BROKEN_VALUES[name]
     sound = {**SCENE, "id": "s0"}
     (problem,) = problems_of(write_scenes(tmp_path, sound, with_value(SCENE, path, value)))
@@ -153,13 +153,13 @@ def test_a_broken_value_is_named_with_file_line_and_field(tmp_path: Path, name: 
     + [f"blocks.0.{field}" for field in CUBE]
     + ["candidates.1.type", "candidates.1.color", "candidates.1.euler"],
 )
-def test_a_missing_field_is_said_once(tmp_path: Path, path: str) -> None:
+def test_a_missing_field_is_said_once(tmp_path, path):
     (problem,) = problems_of(write_scenes(tmp_path, without(SCENE, path)))
     field = path.replace(".0.", "[0].").replace(".1.", "[1].")
     assert (problem.field, problem.message) == (field, "is missing")
 
 
-def test_everything_that_is_wrong_is_said_at_once(tmp_path: Path) -> None:
+def test_everything_that_is_wrong_is_said_at_once(tmp_path):
     first = with_value(with_value(SCENE, "levels", [9]), "blocks.0.depend", [2])
     first = with_value(first, "candidates.0.color", "pink")
     second = {**with_value(SCENE, "blocks.1.layer", 7), "id": "s2"}
@@ -189,9 +189,7 @@ MANY = {
 
 
 @pytest.mark.parametrize(("at", "value"), MANY.values(), ids=MANY)
-def test_a_list_that_is_too_long_is_refused_in_few_words(
-    tmp_path: Path, at: str, value: object
-) -> None:
+def test_a_list_that_is_too_long_is_refused_in_few_words(tmp_path, at, value):
     found = problems_of(write_scenes(tmp_path, with_value(SCENE, at, value)))
     assert len(found) <= 100
     assert all(problem.allowed for problem in found)
@@ -217,7 +215,7 @@ BROKEN_TEXTS: dict[str, tuple[bytes, str, str]] = {
 
 
 @pytest.mark.parametrize("name", BROKEN_TEXTS)
-def test_a_broken_text_is_named_with_its_place(tmp_path: Path, name: str) -> None:
+def test_a_broken_text_is_named_with_its_place(tmp_path, name):
     data, place, message = BROKEN_TEXTS[name]
     (tmp_path / "scenes.jsonl").write_bytes(data)
     problem = problems_of(tmp_path)[0]
@@ -225,7 +223,7 @@ def test_a_broken_text_is_named_with_its_place(tmp_path: Path, name: str) -> Non
     assert message in problem.message
 
 
-def test_a_missing_file_and_a_folder_in_its_place_are_named(tmp_path: Path) -> None:
+def test_a_missing_file_and_a_folder_in_its_place_are_named(tmp_path):
     (problem,) = problems_of(tmp_path / "nowhere")
     assert problem.where.endswith("scenes.jsonl")
     assert "No such file" in problem.message
@@ -277,9 +275,7 @@ def tasks(draw: st.DrawFn) -> AssemblyTask:
 
 @settings(deadline=None)
 @given(written=st.lists(tasks(), min_size=1, max_size=3, unique_by=lambda task: task.scene.id))
-def test_any_valid_scene_reads_back_equal(
-    tmp_path_factory: pytest.TempPathFactory, written: list[AssemblyTask]
-) -> None:
+def test_any_valid_scene_reads_back_equal(tmp_path_factory, written):
     folder = tmp_path_factory.getbasetemp()
     lines = [StoredScene.of(task.scene, task.candidates).as_json() for task in written]
     (folder / "scenes.jsonl").write_text("\n".join(lines), encoding="utf-8")
@@ -289,9 +285,7 @@ def test_any_valid_scene_reads_back_equal(
 
 @settings(deadline=None, max_examples=40)
 @given(SCENES)
-def test_any_scene_is_read_or_refused(
-    tmp_path_factory: pytest.TempPathFactory, line: bytes
-) -> None:
+def test_any_scene_is_read_or_refused(tmp_path_factory, line):
     folder = tmp_path_factory.getbasetemp()
     (folder / "scenes.jsonl").write_bytes(line)
     with contextlib.suppress(DataError):
@@ -301,9 +295,7 @@ def test_any_scene_is_read_or_refused(
 
 @settings(deadline=None, max_examples=40)
 @given(CANDIDATES)
-def test_any_candidate_set_is_read_or_refused(
-    tmp_path_factory: pytest.TempPathFactory, data: bytes
-) -> None:
+def test_any_candidate_set_is_read_or_refused(tmp_path_factory, data):
     path = tmp_path_factory.getbasetemp() / "c.json"
     path.write_bytes(data)
     with contextlib.suppress(DataError):

@@ -68,7 +68,7 @@ LEFT = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("page", LEFT)
-def test_a_reader_comes_to_the_end(page: str, workspace: Workspace) -> None:
+def test_a_reader_comes_to_the_end(page, workspace):
     with Running(OpenAIChat()) as server:
         text = (DOCS / "tutorials" / page).read_text(encoding="utf-8")
         printed = follow(text, workspace, server.url)
@@ -80,14 +80,14 @@ def test_a_reader_comes_to_the_end(page: str, workspace: Workspace) -> None:
         assert "All 24 samples are done" in printed
 
 
-def test_every_tutorial_is_followed() -> None:
+def test_every_tutorial_is_followed():
     assert {page.name for page in (DOCS / "tutorials").glob("*.md")} == {*LEFT, "agent.md"}
 
 
 @pytest.mark.parametrize(
     "page", ["../README.md", "index.md", "models.md", "tutorials/first-model.md"]
 )
-def test_a_model_that_a_page_adds_is_not_there_yet(page: str) -> None:
+def test_a_model_that_a_page_adds_is_not_there_yet(page):
     models = (DOCS.parent / "models.yaml").read_text(encoding="utf-8")
     added = re.findall(r"^(\S+:) openai/", (DOCS / page).read_text(encoding="utf-8"), re.M)
     assert added
@@ -120,7 +120,7 @@ SHOWN: dict[str, tuple[str, str, dict[str, float | None], str, str]] = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize("section", SECTIONS)
-def test_a_plugin_is_in_tables_and_on_the_page(section: str, workspace: Workspace) -> None:
+def test_a_plugin_is_in_tables_and_on_the_page(section, workspace):
     text = SECTIONS[section]
     assert max(code.count("\n") for code in re.findall(r"```python(.*?)```", text, re.S)) <= (
         MOST_LINES
@@ -152,5 +152,5 @@ def page_of(run: Path) -> str:
     return "".join([(run / "report.html").read_text(encoding="utf-8"), *data])
 
 
-def test_every_kind_of_addition_has_a_plugin() -> None:
+def test_every_kind_of_addition_has_a_plugin():
     assert [*SECTIONS] == [*SHOWN]

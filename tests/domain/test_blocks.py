@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -80,7 +79,7 @@ def rotation(euler_deg: Euler) -> Rotation:
 
 
 @given(euler_deg=EULERS)
-def test_euler_angles_are_extrinsic_x_y_z(euler_deg: Euler) -> None:
+def test_euler_angles_are_extrinsic_x_y_z(euler_deg):
     quat_xyzw = euler_deg_to_quat_xyzw(euler_deg)
     assert np.linalg.norm(quat_xyzw) == pytest.approx(1)
     expected = rotation(euler_deg)
@@ -90,14 +89,12 @@ def test_euler_angles_are_extrinsic_x_y_z(euler_deg: Euler) -> None:
 
 
 @given(block_type=TYPES, one=GRID_EULERS, other=GRID_EULERS)
-def test_orientations_are_one_class_exactly_when_the_block_looks_alike(
-    block_type: BlockType, one: Euler, other: Euler
-) -> None:
+def test_orientations_are_one_class_exactly_when_the_block_looks_alike(block_type, one, other):
     same = orientation_class(block_type, one) == orientation_class(block_type, other)
     assert same == looks_alike(block_type, rotation(one), rotation(other))
 
 
-def test_every_grid_orientation_of_every_type_is_classed_by_its_look() -> None:
+def test_every_grid_orientation_of_every_type_is_classed_by_its_look():
     looks = {"cube": 1, "cuboid1": 3, "cuboid2": 6, "cuboid3": 6, "cylinder": 6}
     for block_type in BLOCK_TYPES:
         classes = {orientation_class(block_type, euler) for euler in QUARTER_TURNS}
@@ -118,9 +115,7 @@ SYMMETRIES = {
 
 
 @given(block_type=TYPES, euler_deg=GRID_EULERS, data=st.data())
-def test_a_symmetry_of_the_block_leaves_its_class(
-    block_type: BlockType, euler_deg: Euler, data: st.DataObject
-) -> None:
+def test_a_symmetry_of_the_block_leaves_its_class(block_type, euler_deg, data):
     turn = data.draw(st.sampled_from(SYMMETRIES[block_type]))
     turned = (rotation(euler_deg) * turn).as_matrix()
     # Angles of the turned block, by the textbook formulas for R = Rz Ry Rx.
@@ -135,16 +130,12 @@ def test_a_symmetry_of_the_block_leaves_its_class(
 
 
 @given(block_type=TYPES, euler_deg=GRID_EULERS, turns=st.tuples(*[st.integers(-2, 2)] * 3))
-def test_whole_turns_change_nothing(
-    block_type: BlockType, euler_deg: Euler, turns: tuple[int, int, int]
-) -> None:
+def test_whole_turns_change_nothing(block_type, euler_deg, turns):
     more = tuple(angle + 360 * turn for angle, turn in zip(euler_deg, turns, strict=True))
-    assert orientation_class(block_type, more) == orientation_class(block_type, euler_deg)  # type: ignore[arg-type]
+    assert orientation_class(block_type, more) == orientation_class(block_type, euler_deg)
 
 
-def test_on_the_official_data_classes_and_euler_angles_tell_the_same_apart(
-    official_checkout: Path,
-) -> None:
+def test_on_the_official_data_classes_and_euler_angles_tell_the_same_apart(official_checkout):
     used: dict[BlockType, set[Euler]] = {}
     for task in official_tasks(official_checkout):
         for block in (*task.scene.blocks, *task.candidates.candidates):
@@ -168,7 +159,7 @@ CENTERS_Z_M = {"semi_cylinder": 0.01052, "triangle": 0.01179, "arch": 0.00708}
 
 
 @pytest.mark.parametrize("block_type", BLOCK_TYPES)
-def test_sizes_volumes_and_centers_of_mass(block_type: BlockType) -> None:
+def test_sizes_volumes_and_centers_of_mass(block_type):
     shape = SHAPES[block_type]
     np.testing.assert_allclose(shape.low_m, VERTICES[block_type].min(axis=0), atol=1e-9)
     np.testing.assert_allclose(shape.high_m, VERTICES[block_type].max(axis=0), atol=1e-9)
@@ -190,7 +181,7 @@ CANDIDATES = CandidateSet(
 )
 
 
-def test_a_candidate_is_found_by_its_look_up_to_symmetry() -> None:
+def test_a_candidate_is_found_by_its_look_up_to_symmetry():
     assert [CANDIDATES.index_of(block.look) for block in SCENE.blocks] == [3, 2]
     assert CANDIDATES.missing(SCENE) == ()
     assert CandidateSet(CANDIDATES.candidates[:2]).missing(SCENE) == (3,)

@@ -23,7 +23,7 @@ from phyblock.env import DONE, PhyBlockEnv
 from phyblock.scoring.pose import blocks_reached
 from phyblock.sim.dynamics import execute
 from phyblock.sim.geometry import put
-from phyblock.types import SETTINGS, Setting
+from phyblock.types import SETTINGS
 from tests.tracks.opened import seesaw
 
 ROOT = Path(__file__).parents[2]
@@ -66,16 +66,14 @@ def solve(env: PhyBlockEnv, info: dict[str, Any]) -> tuple[float, dict[str, Any]
     ],
     ids=["pictures", "state", "text", "strict", "poses", "strict poses"],
 )
-def test_gymnasium_finds_nothing_wrong(options: dict[str, Any]) -> None:
+def test_gymnasium_finds_nothing_wrong(options):
     env = gymnasium.make(phyblock.env.ENV_ID, render_mode="rgb_array", **options)
     check_env(env.unwrapped)
     env.close()
 
 
 @pytest.mark.parametrize("setting", SETTINGS)
-def test_an_agent_that_knows_finishes_every_scene_in_as_many_steps_as_blocks(
-    setting: Setting,
-) -> None:
+def test_an_agent_that_knows_finishes_every_scene_in_as_many_steps_as_blocks(setting):
     env = PhyBlockEnv(SOME, setting=setting, physics="off", observe="state")
     for task in SOME:
         _, info = env.reset(options={"scene": task.scene.id})
@@ -85,7 +83,7 @@ def test_an_agent_that_knows_finishes_every_scene_in_as_many_steps_as_blocks(
     env.close()
 
 
-def test_the_same_seed_gives_the_same_episodes() -> None:
+def test_the_same_seed_gives_the_same_episodes():
     first, second = (rollout(PhyBlockEnv(SOME, observe="state"), 7) for _ in range(2))
     assert len(first) == len(second)
     for one, other in zip(first, second, strict=True):
@@ -95,7 +93,7 @@ def test_the_same_seed_gives_the_same_episodes() -> None:
     assert len(scenes) > 1
 
 
-def test_a_state_holds_the_goal_and_the_candidates() -> None:
+def test_a_state_holds_the_goal_and_the_candidates():
     env = PhyBlockEnv(SOME, observe="state")
     for task in SOME:
         observation, _ = env.reset(options={"scene": task.scene.id})
@@ -110,14 +108,14 @@ def test_a_state_holds_the_goal_and_the_candidates() -> None:
     env.close()
 
 
-def test_a_text_is_the_prompt_of_step_planning_after_the_same_steps() -> None:
+def test_a_text_is_the_prompt_of_step_planning_after_the_same_steps():
     suite = ("candidates.order=file", "images.size_px=128", "steps.max_steps=12")
     task = next(iter(phyblock.tasks("step_planning", *suite, data=SOME[:1])))
     env = PhyBlockEnv(SOME[:1], observe="text", size_px=128, max_steps=12)
     episode, (observation, info) = task.episode(), env.reset()
     wrong = next(n for n in range(1, 17) if n not in info["right_moves"])
     for action in (wrong, info["right_moves"][0], 99):
-        sent = [part for message in episode.request.messages for part in message.parts]  # type: ignore[union-attr]
+        sent = [part for message in episode.request.messages for part in message.parts]
         shown = [p if isinstance(p, str) else f"[picture: {p.label}]" for p in sent]
         assert observation["text"] == "\n\n".join(shown)
         for picture in (part for part in sent if not isinstance(part, str)):
@@ -130,7 +128,7 @@ def test_a_text_is_the_prompt_of_step_planning_after_the_same_steps() -> None:
 
 
 @pytest.mark.parametrize("options", [{}, {"action": "pose"}], ids=["blocks", "poses"])
-def test_masked_samples_name_candidates_of_the_scene(options: dict[str, Any]) -> None:
+def test_masked_samples_name_candidates_of_the_scene(options):
     short = replace(SOME[0], candidates=CandidateSet(SOME[0].candidates.candidates[:5]))
     env = PhyBlockEnv([short], observe="state", **options)
     _, info = env.reset()
@@ -145,7 +143,7 @@ def test_masked_samples_name_candidates_of_the_scene(options: dict[str, Any]) ->
     env.close()
 
 
-def test_done_ends_and_a_wrong_move_changes_nothing() -> None:
+def test_done_ends_and_a_wrong_move_changes_nothing():
     env = PhyBlockEnv(SOME[:1], size_px=128)
     observation, info = env.reset()
     wrong = next(n for n in range(1, 17) if n not in info["right_moves"])
@@ -157,7 +155,7 @@ def test_done_ends_and_a_wrong_move_changes_nothing() -> None:
     assert (reward, ended, cut, told["outcome"]) == (0, True, False, "done")
 
 
-def test_a_finished_assembly_looks_like_the_goal() -> None:
+def test_a_finished_assembly_looks_like_the_goal():
     env = PhyBlockEnv(SOME[:1], size_px=64, physics="off", render_mode="rgb_array")
     observation, info = env.reset()
     assert {picture.shape for picture in observation.values()} == {(64, 64, 3)}
@@ -172,9 +170,7 @@ def test_a_finished_assembly_looks_like_the_goal() -> None:
     ("physics", "fallen", "ended"),
     [("off", (), False), ("settle", (3,), False), ("strict", (3,), True)],
 )
-def test_what_physics_does_with_what_cannot_stand(
-    physics: Any, fallen: tuple[int, ...], ended: bool
-) -> None:
+def test_what_physics_does_with_what_cannot_stand(physics, fallen, ended):
     env = PhyBlockEnv([seesaw()], physics=physics, size_px=128)
     env.reset()
     env.step(1)
@@ -203,13 +199,13 @@ def test_what_physics_does_with_what_cannot_stand(
         ({"levels": (2, 9)}, r"levels is \(2, 9\); allowed: several of \(1, 2, 3, 4, 5\)"),
     ],
 )
-def test_an_option_that_is_not_allowed_is_said(options: dict[str, Any], message: str) -> None:
+def test_an_option_that_is_not_allowed_is_said(options, message):
     with pytest.raises(ValueError, match=message):
         PhyBlockEnv(**{"data": SOME, **options})
 
 
 @pytest.mark.parametrize("limit", [{}, {"max_steps": 1}, {"max_failures": 1}])
-def test_nothing_is_carried_out_after_the_end(limit: dict[str, int]) -> None:
+def test_nothing_is_carried_out_after_the_end(limit):
     env = PhyBlockEnv(SOME[:1], observe="state", physics="off", **limit)
     _, info = env.reset()
     wrong = next(n for n in range(1, 17) if n not in info["right_moves"])
@@ -222,7 +218,7 @@ def test_nothing_is_carried_out_after_the_end(limit: dict[str, int]) -> None:
     assert len(info["chosen"]) == 1
 
 
-def test_who_knows_the_poses_reaches_every_block() -> None:
+def test_who_knows_the_poses_reaches_every_block():
     tasks = [task for task in SOME if len(task.scene) < 9][:3]
     env = PhyBlockEnv(tasks, action="pose", observe="state", physics="strict")
     for task in tasks:
@@ -233,7 +229,7 @@ def test_who_knows_the_poses_reaches_every_block() -> None:
     env.close()
 
 
-def test_poses_are_carried_out_as_a_plan_is() -> None:
+def test_poses_are_carried_out_as_a_plan_is():
     """Blocks that fall or are refused, too; the return is how many are reached."""
     env = PhyBlockEnv([seesaw()], action="pose", observe="state", max_steps=20)
     kit = seesaw().candidates
@@ -257,7 +253,7 @@ def test_poses_are_carried_out_as_a_plan_is() -> None:
     env.close()
 
 
-def test_an_action_that_is_no_pose_is_said() -> None:
+def test_an_action_that_is_no_pose_is_said():
     env = PhyBlockEnv([seesaw()], action="pose", observe="state")
     env.reset()
     for wrong, message in (
@@ -280,7 +276,7 @@ def blocks_of_code() -> list[str]:
 
 
 @pytest.mark.parametrize("place", range(len(blocks_of_code())))
-def test_what_the_docs_show_runs(place: int, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_the_docs_show_runs(place, capsys):
     code = blocks_of_code()[place]
     body = [line for line in code.splitlines() if line and not line.startswith(("import", "from"))]
     assert len(body) <= 10

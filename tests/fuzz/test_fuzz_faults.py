@@ -137,9 +137,7 @@ def one_round(workspace: Workspace, server: LedgerChat, track: str) -> None:
 
 
 @pytest.mark.parametrize(("track", "transport"), _CELLS)
-def test_faults(
-    workspace: Workspace, tallies: dict[str, Counter[str]], track: str, transport: str
-) -> None:
+def test_faults(workspace, tallies, track, transport):
     seeds = math.ceil(_QUOTA * (1 - _SHARE) / _SHARE / _ASKED_PER_SEED[track]) + 1
     met: Counter[str] = Counter()
     n = 0
@@ -158,9 +156,7 @@ def test_faults(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("transport", _TRANSPORTS)
-def test_faults_that_stop_a_model(
-    workspace: Workspace, tallies: dict[str, Counter[str]], transport: str
-) -> None:
+def test_faults_that_stop_a_model(workspace, tallies, transport):
     faults = Faults.spread(_STOPPING, 0.5, seed=1 + SEED)
     with Running(LedgerChat(faults)) as running:
         server = running.server
@@ -219,7 +215,7 @@ def batch_faults(draw: st.DrawFn) -> BatchFaults:
 )
 @fuzzed(15)
 @given(batch_faults(), st.lists(st.integers(0, 25), max_size=3))
-def test_batches(way: str, faults: BatchFaults, kills: list[int]) -> None:
+def test_batches(way, faults, kills):
     kind, route = WAYS[way]
     requests = [make_request(f"{n:03d}") for n in range(ASKED)]
     policy = replace(QUICK, attempts=3, max_connection_failures=3)
@@ -274,9 +270,7 @@ class Moody(OpenAIChat):
 
 
 @pytest.mark.parametrize("number", range(_ROUNDS))
-def test_no_more_is_spent_than_the_limit_and_what_was_under_way(
-    workspace: Workspace, tallies: dict[str, Counter[str]], number: int
-) -> None:
+def test_no_more_is_spent_than_the_limit_and_what_was_under_way(workspace, tallies, number):
     draw = random.Random(f"{SEED} costs {number}")
     limit = 10 ** draw.uniform(-1, 2)
     with Running(Moody(draw)) as running:

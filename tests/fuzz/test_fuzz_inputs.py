@@ -33,7 +33,6 @@ from tests.fuzz.strategies import (
     fuzzed,
 )
 from tests.records.damage import YAML_TEXTS
-from tests.workspace import Workspace
 
 pytestmark = pytest.mark.fuzz
 
@@ -292,14 +291,12 @@ def _with_bad_line(path: Path) -> st.SearchStrategy[bytes]:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_bad_input(plain_bench: Bench, tallies: dict[str, Counter[str]], kind: str) -> None:
+def test_bad_input(plain_bench, tallies, kind):
     percent, cases = KINDS[kind]
     try_cases(plain_bench, cases, percent, tallies.setdefault(kind, Counter()))
 
 
-def test_bad_run_folder(
-    runs_bench: Bench, ended: Workspace, tallies: dict[str, Counter[str]]
-) -> None:
+def test_bad_run_folder(runs_bench, ended, tallies):
     tally = tallies.setdefault("run folders", Counter())
     try_cases(runs_bench, run_cases(ended.root), _OF_RUNS_PERCENT, tally)
 

@@ -105,13 +105,7 @@ def run_until_killed(
         *(pytest.param(track, 4, (), marks=pytest.mark.slow) for track in TRACKS),
     ],
 )
-def test_kills(
-    workspace: Workspace,
-    tallies: dict[str, Counter[str]],
-    track: str,
-    count: int,
-    options: tuple[str, ...],
-) -> None:
+def test_kills(workspace, tallies, track, count, options):
     asked_per_seed, fields = TRACKS[track]
     rounds = -(-KILLS // len(TRACKS))
     draw = random.Random(f"{SEED} {track} {count}")

@@ -65,11 +65,11 @@ def check(checkout: Path, expected: Scores, score: Callable[[str, str], float]) 
     assert {name: score(name[1], text) for name, text in replies.items()} == expected
 
 
-def test_tasks(official_checkout: Path, known: phyblock.Tasks, expected: Scores) -> None:
+def test_tasks(official_checkout, known, expected):
     check(official_checkout, expected, lambda key, text: known[key].score(text).value)
 
 
-def test_inspect(official_checkout: Path, known: phyblock.Tasks, expected: Scores) -> None:
+def test_inspect(official_checkout, known, expected):
     pytest.importorskip("inspect_ai", reason="inspect_ai is not installed")
     from inspect_ai.model import ModelName, ModelOutput
     from inspect_ai.scorer import Target
@@ -90,7 +90,7 @@ def test_inspect(official_checkout: Path, known: phyblock.Tasks, expected: Score
 
 
 @pytest.mark.parametrize("track", ["full_planning", "step_planning"])
-def test_an_eval_of_inspect(track: str, tmp_path: Path) -> None:
+def test_an_eval_of_inspect(track, tmp_path):
     pytest.importorskip("inspect_ai", reason="inspect_ai is not installed")
     with Running(OpenAIChat()) as running:
         call = f"""-m inspect_ai eval phyblock/{track} -T items=4 -T overrides=[images.size_px=128]
@@ -114,7 +114,7 @@ def test_an_eval_of_inspect(track: str, tmp_path: Path) -> None:
         ("[1,2]", '["seeds=[1]"]'),
     ],
 )
-def test_arguments_of_inspect(levels: str, overrides: str) -> None:
+def test_arguments_of_inspect(levels, overrides):
     pytest.importorskip("inspect_ai", reason="inspect_ai is not installed")
     from inspect_ai._cli.util import parse_cli_args
 
@@ -125,7 +125,7 @@ def test_arguments_of_inspect(levels: str, overrides: str) -> None:
     assert parts == {f"level {level}" for level in levels if level.isdecimal()}
 
 
-def test_a_sample_of_inspect_that_a_limit_stops_keeps_its_replies(tmp_path: Path) -> None:
+def test_a_sample_of_inspect_that_a_limit_stops_keeps_its_replies(tmp_path):
     pytest.importorskip("inspect_ai", reason="inspect_ai is not installed")
     with Running(OpenAIChat()) as running:
         call = f"""-m inspect_ai eval phyblock/step_planning -T items=1 --turn-limit 2
@@ -142,7 +142,7 @@ def test_a_sample_of_inspect_that_a_limit_stops_keeps_its_replies(tmp_path: Path
     assert score["metadata"]["outcome"] != "missing"
 
 
-def test_verifiers(official_checkout: Path, expected: Scores) -> None:
+def test_verifiers(official_checkout, expected):
     pytest.importorskip("verifiers", reason="verifiers is not installed")
     import verifiers.v1 as vf
     from verifiers.v1.graph import MessageNode
@@ -169,7 +169,7 @@ def test_verifiers(official_checkout: Path, expected: Scores) -> None:
             assert type(task)(task.data).found().key == task.data.id
 
 
-def test_openenv(official_checkout: Path, known: phyblock.Tasks, expected: Scores) -> None:
+def test_openenv(official_checkout, known, expected):
     pytest.importorskip("openenv", reason="openenv is not installed")
     from phyblock.integrations.openenv import PhyBlockAction, PhyBlockEnvironment, TasksInTurn
 
@@ -193,7 +193,7 @@ def test_openenv(official_checkout: Path, known: phyblock.Tasks, expected: Score
 
 
 @pytest.mark.parametrize("text", ["full_planning", "[1]", "{}"])
-def test_tasks_of_an_environment(text: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_tasks_of_an_environment(text, monkeypatch):
     pytest.importorskip("openenv", reason="openenv is not installed")
     from phyblock.integrations.openenv import tasks_of_environment
 
@@ -205,7 +205,7 @@ def test_tasks_of_an_environment(text: str, monkeypatch: pytest.MonkeyPatch) -> 
     assert len(tasks_of_environment()) == 2
 
 
-def test_a_server_of_openenv(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_server_of_openenv(capsys):
     pytest.importorskip("openenv", reason="openenv is not installed")
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
@@ -224,7 +224,7 @@ def test_a_server_of_openenv(capsys: pytest.CaptureFixture[str]) -> None:
     assert "'measure': 'f1'" in capsys.readouterr().out
 
 
-def test_trl(official_checkout: Path, known: phyblock.Tasks, expected: Scores) -> None:
+def test_trl(official_checkout, known, expected):
     pytest.importorskip("datasets", reason="datasets is not installed")
     from phyblock.integrations.trl import dataset, reward
 
@@ -248,7 +248,7 @@ def test_trl(official_checkout: Path, known: phyblock.Tasks, expected: Scores) -
         dataset(phyblock.tasks("step_planning", limit=2))
 
 
-def test_lmms_eval(tmp_path: Path) -> None:
+def test_lmms_eval(tmp_path):
     from phyblock.integrations import files
 
     written = files.write_lmms_eval(tmp_path, 4)

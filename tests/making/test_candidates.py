@@ -59,7 +59,7 @@ def fresh(count: int, seed: int) -> Tasks:
 
 @given(scenes, st.integers(0, 9))
 @settings(deadline=None)
-def test_all_that_is_needed_is_there_and_no_look_twice(scene: Scene, seed: int) -> None:
+def test_all_that_is_needed_is_there_and_no_look_twice(scene, seed):
     candidates = make_candidates(scene, seed)
     assert candidates.missing(scene) == ()
     assert len(candidates) == MAX_CANDIDATES
@@ -68,7 +68,7 @@ def test_all_that_is_needed_is_there_and_no_look_twice(scene: Scene, seed: int) 
 
 @given(scenes)
 @settings(deadline=None)
-def test_distractors_are_of_the_palette_in_poses_that_goals_need(scene: Scene) -> None:
+def test_distractors_are_of_the_palette_in_poses_that_goals_need(scene):
     needed = {block.look for block in scene.blocks}
     known = {
         Candidate(*kind, POSES[kind[0]][pose]).look
@@ -78,12 +78,12 @@ def test_distractors_are_of_the_palette_in_poses_that_goals_need(scene: Scene) -
     assert {one.look for one in make_candidates(scene).candidates} <= needed | known
 
 
-def test_too_many_different_blocks_are_refused() -> None:
+def test_too_many_different_blocks_are_refused():
     with pytest.raises(DataError, match="at most 16"):
         make_candidates(scene_of(EVERY_LOOK[:17]))
 
 
-def test_distractors_are_drawn_as_goals_of_the_grammar_need_them() -> None:
+def test_distractors_are_drawn_as_goals_of_the_grammar_need_them():
     """The table of needs holds for the built-in goals, within chance and what seeds differ by."""
     goals = [scene for scene, _ in built_in()]
     pose = {
@@ -98,7 +98,7 @@ def test_distractors_are_drawn_as_goals_of_the_grammar_need_them() -> None:
             assert abs(rate - needs.get(name, 0.0)) < 0.1, (kind, name)
 
 
-def test_no_place_tells_what_is_needed() -> None:
+def test_no_place_tells_what_is_needed():
     needed = [
         [one.look in {b.look for b in scene.blocks} for one in offered.candidates]
         for scene, offered in built_in()
@@ -133,15 +133,13 @@ def gain(tasks: Tasks, setting: Setting, repeats: bool) -> float:
 
 @pytest.mark.parametrize("setting", SETTINGS)
 @pytest.mark.parametrize("repeats", [False, pytest.param(True, marks=pytest.mark.slow)])
-def test_no_learner_wins_by_the_candidates_of_the_built_in_set(
-    setting: Setting, repeats: bool
-) -> None:
+def test_no_learner_wins_by_the_candidates_of_the_built_in_set(setting, repeats):
     assert gain(built_in(), setting, repeats) <= GAIN
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("setting", SETTINGS)
-def test_nor_by_those_of_a_fresh_set(setting: Setting) -> None:
+def test_nor_by_those_of_a_fresh_set(setting):
     tasks = fresh(400, 8)
     assert gain(tasks, setting, repeats=False) <= GAIN
     assert gain(tasks, setting, repeats=True) <= GAIN

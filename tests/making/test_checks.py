@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shutil
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -95,13 +94,13 @@ SPOILED = {
 }
 
 
-def test_every_check_has_an_example_here_and_is_chosen_somewhere() -> None:
+def test_every_check_has_an_example_here_and_is_chosen_somewhere():
     assert set(SPOILED) == set(CHECKS) == {*VERIFIED, "palette"}
     assert set(AUDITED) <= set(VERIFIED)
 
 
 @pytest.mark.parametrize("name", SPOILED)
-def test_a_check_finds_its_own_fault_measured_in_units(name: str) -> None:
+def test_a_check_finds_its_own_fault_measured_in_units(name):
     assert list(findings_of(SceneFacts(GATE, OFFERED, QUICK), [name])) == []
     make, said = SPOILED[name]
     facts = make()
@@ -117,7 +116,7 @@ def test_a_check_finds_its_own_fault_measured_in_units(name: str) -> None:
             assert finding.value_mm > finding.tolerance_mm
 
 
-def test_duplicates_and_orphans_of_a_set_are_found() -> None:
+def test_duplicates_and_orphans_of_a_set_are_found():
     def moved(block: Block) -> Block:
         x, y, z = block.position_m
         return replace(block, position_m=(x + 0.2, y, z))
@@ -129,7 +128,7 @@ def test_duplicates_and_orphans_of_a_set_are_found() -> None:
     assert found == [("copy", "duplicate"), (orphan.id, "parents")]
 
 
-def test_a_changed_or_missing_file_is_named(tmp_path: Path) -> None:
+def test_a_changed_or_missing_file_is_named(tmp_path):
     folder = tmp_path / "set"
     shutil.copytree(BUILT_IN, folder)
     assert check_sums(folder) == (3, ())
@@ -141,7 +140,7 @@ def test_a_changed_or_missing_file_is_named(tmp_path: Path) -> None:
     assert check_sums(folder)[1][0].message == "is missing"
 
 
-def test_the_built_in_set_holds_what_the_paper_holds() -> None:
+def test_the_built_in_set_holds_what_the_paper_holds():
     scenes = [task.scene for task in TASKS]
     assert len(scenes) == 400
     count = {level: sum(level in scene.levels for scene in scenes) for level in (1, 2, 3, 4)}
@@ -154,7 +153,7 @@ def test_the_built_in_set_holds_what_the_paper_holds() -> None:
 
 
 @pytest.mark.parametrize("task", TASKS[::100], ids=lambda task: task.scene.id)
-def test_some_of_the_built_in_set_again(task) -> None:
+def test_some_of_the_built_in_set_again(task):
     assert verify_scene((task.scene, task.candidates)) == ()
 
 
@@ -162,7 +161,7 @@ def checks_of(findings: tuple[Finding, ...]) -> set[str]:
     return {finding.check for finding in findings}
 
 
-def test_official_annotation_errors_are_reported(official_checkout: Path) -> None:
+def test_official_annotation_errors_are_reported(official_checkout):
     tasks = {task.scene.id: task for task in official_tasks(official_checkout)}
     for name in ("000", "001", "040", "069", "187"):
         found = checks_of(audit_scene((tasks[name].scene, tasks[name].candidates), QUICK_FOREIGN))
@@ -172,7 +171,7 @@ def test_official_annotation_errors_are_reported(official_checkout: Path) -> Non
 
 
 @pytest.mark.slow
-def test_the_whole_official_data(official_checkout: Path) -> None:
+def test_the_whole_official_data(official_checkout):
     tasks = [(task.scene, task.candidates) for task in official_tasks(official_checkout)]
     with open_workers(2) as workers:
         audits = dict(zip((s.id for s, _ in tasks), workers.map(audit_scene, tasks), strict=True))

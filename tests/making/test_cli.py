@@ -47,9 +47,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-def test_what_is_made_is_verified_and_a_changed_scene_is_named(
-    folder: Path, tmp_path: Path
-) -> None:
+def test_what_is_made_is_verified_and_a_changed_scene_is_named(folder, tmp_path):
     assert "few: all checks passed" in scenes("verify", *ALONE, folder).stdout
     lines = (folder / "scenes.jsonl").read_text(encoding="utf-8").splitlines()
     spoiled = json.loads(lines[0])
@@ -63,7 +61,7 @@ def test_what_is_made_is_verified_and_a_changed_scene_is_named(
     assert "floats 10.00 mm above its support" in done.output
 
 
-def test_processes_and_shards_make_the_same_files(folder: Path, tmp_path: Path) -> None:
+def test_processes_and_shards_make_the_same_files(folder, tmp_path):
     words = ("generate", "--count", 3, "--levels", 2, "--seed", 3)
     for number in (2, 1, 3):
         shard = ("--shard", f"{number}/3", *ALONE, "--out", tmp_path / "few")
@@ -83,7 +81,7 @@ def test_processes_and_shards_make_the_same_files(folder: Path, tmp_path: Path) 
         assert (tmp_path / "shards" / path.name).read_bytes() == path.read_bytes()
 
 
-def test_a_set_holds_nothing_of_those_that_it_excludes(folder: Path, tmp_path: Path) -> None:
+def test_a_set_holds_nothing_of_those_that_it_excludes(folder, tmp_path):
     words = ("generate", "--count", 3, "--levels", 2, "--seed", 3, *ALONE)
     said = scenes(*words, "--exclude", folder, "--out", tmp_path / "other").stdout
     rejected = int(said.splitlines()[-1].split()[0])
@@ -104,9 +102,7 @@ def test_a_set_holds_nothing_of_those_that_it_excludes(folder: Path, tmp_path: P
     )
 
 
-def test_a_season_is_made_again_from_what_was_revealed_and_from_nothing_else(
-    tmp_path: Path,
-) -> None:
+def test_a_season_is_made_again_from_what_was_revealed_and_from_nothing_else(tmp_path):
     begin = ("commit", "--public", "round 7 of a beacon", "--out")
     scenes(*begin, tmp_path, "--", "--count", 1, "--levels", 3)
     commitment, secret = tmp_path / "commitment.json", tmp_path / "secret.txt"
@@ -152,7 +148,7 @@ def test_a_season_is_made_again_from_what_was_revealed_and_from_nothing_else(
         *((("questions", "--subtasks", bad), "some of SH,CO,SI") for bad in ("XX", "CO,CO", "")),
     ],
 )
-def test_bad_options_are_refused(words: tuple[str, ...], said: str, tmp_path: Path) -> None:
+def test_bad_options_are_refused(words, said, tmp_path):
     out = tmp_path / "out"
     args = [words[0], "generate", "--out", str(out), *words[1:]]
     done = CliRunner(env={"COLUMNS": "160"}).invoke(phyblock, args)
@@ -174,7 +170,7 @@ def data(tmp_path: Path) -> Path:
     return folder
 
 
-def test_an_audit_lists_findings(data: Path, tmp_path: Path) -> None:
+def test_an_audit_lists_findings(data, tmp_path):
     table = tmp_path / "found.csv"
     told = scenes("audit", data, *ALONE, "--csv", table).stdout
     assert "6 scenes read; 5 with no finding" in told
@@ -191,7 +187,7 @@ def test_an_audit_lists_findings(data: Path, tmp_path: Path) -> None:
         scenes("audit", data, "--csv", data / "scenes.jsonl" / "x")
 
 
-def test_show_prints_the_facts(data: Path) -> None:
+def test_show_prints_the_facts(data):
     told = scenes("show", data, "t3").stdout
     assert "scene t3 · level 3 · 3 blocks · 3 layers" in told
     assert "0 0 75" in told
@@ -199,7 +195,7 @@ def test_show_prints_the_facts(data: Path) -> None:
         scenes("show", data, "t9")
 
 
-def test_render_names_views_backgrounds_and_kinds(data: Path, tmp_path: Path) -> None:
+def test_render_names_views_backgrounds_and_kinds(data, tmp_path):
     out = tmp_path / "out"
     scenes("render", data, "t1", *ALONE, "--out", out, "--composite", "--gif")
     stem = "t1-oblique-checkerboard"
@@ -230,7 +226,7 @@ def questions_of(folder: Path) -> list[dict[str, Any]]:
     return [json.loads(line) for line in text.splitlines()]
 
 
-def test_questions_are_written_with_card_and_checksums(asked: Path) -> None:
+def test_questions_are_written_with_card_and_checksums(asked):
     assert sorted(path.name for path in (asked / "q").iterdir()) == [
         "CARD.md",
         "SHA256SUMS",
@@ -246,9 +242,7 @@ def test_questions_are_written_with_card_and_checksums(asked: Path) -> None:
     assert f"scenes of `{asked.name}`" in card
 
 
-def test_answers_are_derived_again_and_a_corrupted_one_is_named(
-    asked: Path, tmp_path: Path
-) -> None:
+def test_answers_are_derived_again_and_a_corrupted_one_is_named(asked, tmp_path):
     done = vqa("verify", asked / "q", "--data", asked, *ALONE)
     assert "all checks passed" in done.stdout
     found = questions_of(asked / "q")
@@ -264,7 +258,7 @@ def test_answers_are_derived_again_and_a_corrupted_one_is_named(
     assert "differs from its checksum" in done.output
 
 
-def test_a_question_is_shown_with_its_pictures(asked: Path, tmp_path: Path) -> None:
+def test_a_question_is_shown_with_its_pictures(asked, tmp_path):
     first = questions_of(asked / "q")[0]
     where = ("--questions", asked / "q", "--data", asked)
     done = vqa("show", "co-001", *where, "--out", tmp_path / "co.png")
@@ -276,7 +270,7 @@ def test_a_question_is_shown_with_its_pictures(asked: Path, tmp_path: Path) -> N
         vqa("show", "co-0001", *where)
 
 
-def test_an_audit_says_what_it_finds(asked: Path, tmp_path: Path) -> None:
+def test_an_audit_says_what_it_finds(asked, tmp_path):
     found = questions_of(asked / "q")
     again = {**found[0], "id": "co-009"}
     text = "".join(json.dumps(one) + "\n" for one in [*found, again])
@@ -306,7 +300,7 @@ def killed_once(mark: str) -> int:
 @pytest.mark.slow
 @pytest.mark.skipif(not HAS_RAY, reason="Ray is not installed: pip install 'phyblock[ray]'")
 @pytest.mark.filterwarnings("ignore")
-def test_a_killed_worker_loses_and_doubles_nothing(tmp_path: Path) -> None:
+def test_a_killed_worker_loses_and_doubles_nothing(tmp_path):
     with open_workers() as workers:
         expected = list(Production(3, "kit", workers).scenes(SHARES))
     with open_workers(2, "local") as workers:
@@ -315,15 +309,13 @@ def test_a_killed_worker_loses_and_doubles_nothing(tmp_path: Path) -> None:
         assert list(Production(3, "kit", workers).scenes(SHARES)) == expected
 
 
-def test_no_ray_and_no_cluster_are_told() -> None:
+def test_no_ray_and_no_cluster_are_told():
     with pytest.raises(InputError, match="--ray"), open_workers(2, "127.0.0.1:1"):
         pass
 
 
 @pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGKILL])
-def test_workers_end_with_the_process_that_started_them(
-    sent: signal.Signals, tmp_path: Path
-) -> None:
+def test_workers_end_with_the_process_that_started_them(sent, tmp_path):
     for name, text in (("work.py", WORK), ("tasks.py", TASKS)):
         (tmp_path / name).write_text(text, encoding="utf-8")
     words = [sys.executable, str(tmp_path / "work.py")]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -18,7 +17,7 @@ from phyblock.making.checks import verify_scene
 from phyblock.making.files import check_sums
 from phyblock.making.scenes.completing import GivenScene, ReadScene, complete, derived, read_given
 from tests.shipped import TASKS
-from tests.workspace import SCENES, Workspace
+from tests.workspace import SCENES
 
 GABLES = [
     {"type": "cube", "color": "red", "position": [0, -0.05, 0.025]},
@@ -55,18 +54,18 @@ def same(scene: Scene) -> bool:
 
 @given(st.sampled_from(TASKS))
 @settings(max_examples=5, deadline=None)
-def test_a_scene_that_is_stripped_comes_back(task: Any) -> None:
+def test_a_scene_that_is_stripped_comes_back(task):
     assert same(task.scene)
 
 
 @pytest.mark.slow
-def test_all_scenes_that_are_stripped_come_back() -> None:
+def test_all_scenes_that_are_stripped_come_back():
     assert [task.key for task in TASKS if not same(task.scene)] == []
 
 
 @given(order=st.permutations(range(5)))
 @settings(max_examples=20, deadline=None)
-def test_blocks_may_be_listed_in_any_order(order: list[int]) -> None:
+def test_blocks_may_be_listed_in_any_order(order):
     scene = derived("gables", of(*(GABLES[i] for i in order)), "here")
     assert [block.order for block in scene.blocks] == [1, 2, 3, 4, 5]
     assert scene.graph.is_valid(range(5))
@@ -95,14 +94,14 @@ def moved(number: int, *by_m: float) -> list[Any]:
          "hint: order blocks so that each can be placed"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_built_is_refused(blocks: list[Any], said: str) -> None:
+def test_what_cannot_be_built_is_refused(blocks, said):
     with pytest.raises(DataError) as caught:
         complete(ReadScene("mine", of(*blocks), "mine.yaml:3:1"))
     assert said in str(caught.value)
     assert all(problem.where == "mine.yaml:3:1" for problem in caught.value.problems)
 
 
-def test_what_is_unusual_is_noted_and_what_is_given_wrong_is_derived() -> None:
+def test_what_is_unusual_is_noted_and_what_is_given_wrong_is_derived():
     blocks = [*GABLES[:2], {**GABLES[2], "depend": [1], "layer": 3}, *GABLES[3:]]
     done = complete(ReadScene("mine", of(*blocks, levels=[1]), "here"))
     assert done.scene.levels == (1,)
@@ -111,7 +110,7 @@ def test_what_is_unusual_is_noted_and_what_is_given_wrong_is_derived() -> None:
 
 
 @pytest.mark.parametrize("form", ["one.yaml", "list.yml", "named.json", "lines.jsonl", "folder"])
-def test_scenes_are_read_in_any_form(tmp_path: Path, form: str) -> None:
+def test_scenes_are_read_in_any_form(tmp_path, form):
     one = {"id": "gables", "blocks": GABLES}
     path = tmp_path / form
     if form == "one.yaml":
@@ -142,7 +141,7 @@ def test_scenes_are_read_in_any_form(tmp_path: Path, form: str) -> None:
          " {id: a, blocks: [{type: cube, color: red, position: [0, 0, 0.025]}]}]", "is used by"),
     ],
 )  # fmt: skip
-def test_a_file_that_is_wrong_is_said_with_its_line(tmp_path: Path, text: str, said: str) -> None:
+def test_a_file_that_is_wrong_is_said_with_its_line(tmp_path, text, said):
     path = tmp_path / "mine.yaml"
     path.write_text(text, encoding="utf-8")
     with pytest.raises(DataError) as caught:
@@ -150,7 +149,7 @@ def test_a_file_that_is_wrong_is_said_with_its_line(tmp_path: Path, text: str, s
     assert said in str(caught.value)
 
 
-def test_what_is_completed_is_a_data_set_that_validates_and_runs(workspace: Workspace) -> None:
+def test_what_is_completed_is_a_data_set_that_validates_and_runs(workspace):
     source = workspace.write_yaml("gables.yaml", {"scenes": [
         {"id": "gables", "blocks": GABLES},
         {"id": "tower", "blocks": [{k: v for k, v in block.items() if k not in ("depend", "layer")}

@@ -15,7 +15,7 @@ from phyblock.data.scenes import read_builtin
 from phyblock.domain.blocks import SHAPES, BlockType, Color, Euler
 from phyblock.domain.question import LETTERS, Mark, QuestionPicture
 from phyblock.domain.scene import Block, Scene
-from phyblock.domain.symmetry import SYMMETRIES, Symmetry, turned_form
+from phyblock.domain.symmetry import SYMMETRIES, turned_form
 from phyblock.files import bundled
 from phyblock.making.questions.base import WORDINGS, Draft, UnfairError, four_alike, ranks_among
 from phyblock.making.questions.dynamics import (
@@ -81,9 +81,7 @@ def shown(*blocks: Block, azimuth: float = 45.0) -> QuestionPicture:
 @given(
     st.sampled_from(SCENES[::10]), st.sets(st.sampled_from(FEATURES), min_size=1), st.floats(0, 360)
 )
-def test_a_name_fits_its_block_alone_and_speaks_of_what_it_may(
-    scene: Scene, features: set[Feature], azimuth: float
-) -> None:
+def test_a_name_fits_its_block_alone_and_speaks_of_what_it_may(scene, features, azimuth):
     picture = QuestionPicture("scene", scene.blocks, (azimuth, 25.0))
     for one in scene.blocks:
         for name in names(one, picture, sorted(features)):
@@ -109,9 +107,7 @@ def test_a_name_fits_its_block_alone_and_speaks_of_what_it_may(
         ("blue cube in layer 2", (0, 0, 0.075), 45.0, (2,)),
     ],
 )
-def test_words_for_places_fit_one_block_or_none(
-    text: str, place: tuple[float, float, float], azimuth: float, orders: tuple[int, ...]
-) -> None:
+def test_words_for_places_fit_one_block_or_none(text, place, azimuth, orders):
     other = block(2, place, (1,) if place[2] > 0.05 else (), color="blue")
     assert resolve(text, shown(block(1, (0, 0, 0.025)), other, azimuth=azimuth)) == orders
 
@@ -120,7 +116,7 @@ def test_words_for_places_fit_one_block_or_none(
 
 
 @given(st.sampled_from([name for name, shape in SHAPES.items() if shape.is_long]), st.data())
-def test_a_turn_is_the_one_that_was_made(kind: BlockType, data: st.DataObject) -> None:
+def test_a_turn_is_the_one_that_was_made(kind, data):
     euler = data.draw(st.sampled_from(sorted(POSES[kind].values())))
     lying = block(1, (0, 0, 0.1), kind=kind, euler=euler)
     try:
@@ -133,7 +129,7 @@ def test_a_turn_is_the_one_that_was_made(kind: BlockType, data: st.DataObject) -
 
 @settings(max_examples=30, deadline=None)
 @given(scenes, seeds)
-def test_a_loose_block_stands_free_on_the_ground(scene: Scene, seed: int) -> None:
+def test_a_loose_block_stands_free_on_the_ground(scene, seed):
     loose = put_beside(scene.blocks[0], scene.blocks, np.random.default_rng(seed))
     every = (*scene.blocks, loose)
     assert not find_overlaps(every)
@@ -143,7 +139,7 @@ def test_a_loose_block_stands_free_on_the_ground(scene: Scene, seed: int) -> Non
 
 @settings(max_examples=40, deadline=None)
 @given(scenes)
-def test_layers_are_one_more_than_what_is_below(scene: Scene) -> None:
+def test_layers_are_one_more_than_what_is_below(scene):
     try:
         layers = layers_of(scene.blocks)
     except UnfairError:
@@ -155,9 +151,7 @@ def test_layers_are_one_more_than_what_is_below(scene: Scene) -> None:
 
 @settings(max_examples=40, deadline=None)
 @given(scenes, st.sampled_from(SYMMETRIES), st.sampled_from(sorted(LENGTHS)))
-def test_lengths_stay_what_they_are_in_a_mirror_and_after_a_turn(
-    scene: Scene, symmetry: Symmetry, rule: str
-) -> None:
+def test_lengths_stay_what_they_are_in_a_mirror_and_after_a_turn(scene, symmetry, rule):
     other = transformed(scene.blocks, symmetry)
     for (a, x), (b, y) in itertools.islice(
         itertools.permutations(zip(scene.blocks, other, strict=True), 2), 20
@@ -169,7 +163,7 @@ def test_lengths_stay_what_they_are_in_a_mirror_and_after_a_turn(
         assert LENGTHS[rule](x, y, other) == pytest.approx(length, abs=1e-5)
 
 
-def test_a_hidden_block_is_sure_where_one_that_shows_rests_on_it_alone() -> None:
+def test_a_hidden_block_is_sure_where_one_that_shows_rests_on_it_alone():
     wall = [block(i, (0.06, y, 0.025)) for i, y in enumerate((-0.05, 0.0, 0.05), 1)]
     low, high = block(5, (0, 0, 0.025)), block(6, (0, 0, 0.075), (5,))
     assert sure_blocks(QuestionPicture("scene", (*wall, low, high), (0.0, 18.0))) == 5
@@ -188,7 +182,7 @@ def benches(weights: int, pillar_m: float, rng: np.random.Generator) -> Iterator
 
 
 @pytest.mark.parametrize("pillar_m", [0.0, THIN_M, WIDE_M])
-def test_a_bench_leaves_the_scene_as_it_is_and_its_lever_says_what_stays(pillar_m: float) -> None:
+def test_a_bench_leaves_the_scene_as_it_is_and_its_lever_says_what_stays(pillar_m):
     """Nothing overlaps or floats; statics mostly say what a lever does, but for other tops.
 
     What rests on a block that goes is not always what falls.
@@ -222,7 +216,7 @@ def test_a_bench_leaves_the_scene_as_it_is_and_its_lever_says_what_stays(pillar_
 
 
 @pytest.mark.parametrize("rank", range(3))
-def test_of_four_next_steps_one_stays_however_far_its_plank_hangs_over(rank: int) -> None:
+def test_of_four_next_steps_one_stays_however_far_its_plank_hangs_over(rank):
     """All lean by steps, with margins to either side of what the top bears."""
     rng, others = np.random.default_rng(3), set[int]()
     for on, other in zip(benches(2, THIN_M, rng), itertools.cycle(range(4))):
@@ -253,9 +247,7 @@ VIEW = (300.0, 35.0)
     ("place_m", "stays"),
     [((0, 0), True), ((0, -0.068), False), ((0, 0.05), False), ((0, -0.053), None)],
 )
-def test_a_block_stays_where_the_plank_does_not_tip(
-    place_m: tuple[float, float], stays: bool | None
-) -> None:
+def test_a_block_stays_where_the_plank_does_not_tip(place_m, stays):
     """It falls off the wall as well; unsure is where the weights are nearly over the edge."""
     plain = QuestionPicture("scene", (*PLANK, WALL), VIEW, marks=(Mark("A", (*place_m, TOP_M)),))
     assert stays_at(plain, PUT, (*place_m, TOP_M)) is stays
@@ -263,7 +255,7 @@ def test_a_block_stays_where_the_plank_does_not_tip(
     assert is_on_face(plain, put, (*place_m, TOP_M)) is (place_m[1] <= 0)
 
 
-def test_options_of_viewpoints_differ_in_colors_at_one_height_alone() -> None:
+def test_options_of_viewpoints_differ_in_colors_at_one_height_alone():
     maker, rng = ViewpointMaker(), np.random.default_rng(5)
     found = [draft for scene in SCENES[::40] for draft in maker.drafts(scene, rng)]
     assert {draft.wording for draft in found} == {"vp-match", "vp-side"}
@@ -289,7 +281,7 @@ def drawn(seed: int, n: int = 10) -> tuple[np.random.Generator, np.ndarray]:
 
 
 @given(seed=seeds)
-def test_options_that_are_taken_are_apart_and_one_is_right(seed: int) -> None:
+def test_options_that_are_taken_are_apart_and_one_is_right(seed):
     rng, measures = drawn(seed)
     unlike = rng.random((len(measures),) * 2)
     unlike += unlike.T
@@ -300,7 +292,7 @@ def test_options_that_are_taken_are_apart_and_one_is_right(seed: int) -> None:
         assert all(unlike[a, b] >= 0.7 for a, b in itertools.combinations(four, 2))
 
 
-def test_no_rank_is_more_often_right_than_another() -> None:
+def test_no_rank_is_more_often_right_than_another():
     """The right one would always be the largest if it were not matched."""
     ranks: Counter[int] = Counter()
     for seed in range(200):
@@ -314,7 +306,7 @@ def test_no_rank_is_more_often_right_than_another() -> None:
 
 
 @given(st.integers(0, 200), seeds)
-def test_every_letter_is_right_about_as_often(count: int, seed: int) -> None:
+def test_every_letter_is_right_about_as_often(count, seed):
     letters = Counter(even_letters(count, np.random.default_rng(seed)))
     assert letters.total() == count
     for index in range(len(LETTERS)):
@@ -352,7 +344,7 @@ def rate_off(texts: list[Draft]) -> float:
     return max(abs(right[shape] / offered[shape] - 0.25) for shape in SHAPE_TEXTS)
 
 
-def test_of_the_drafts_kept_each_option_is_right_equally_often() -> None:
+def test_of_the_drafts_kept_each_option_is_right_equally_often():
     texts, rng = pool(3000, (0.4, 0.25, 0.15, 0.1, 0.1), 1), np.random.default_rng(2)
     odds = dict(zip(map(id, texts), keeping_odds(texts), strict=True))
     for word in ("topmost", "leftmost"):

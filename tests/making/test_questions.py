@@ -6,7 +6,6 @@ import hashlib
 import itertools
 from collections import Counter
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -80,9 +79,7 @@ def pictured() -> list[Question]:
     return dynamic()
 
 
-def test_every_answer_is_derived_again_and_every_other_is_found_out(
-    static: list[Question], pictured: list[Question]
-) -> None:
+def test_every_answer_is_derived_again_and_every_other_is_found_out(static, pictured):
     assert Counter(q.subtask for q in static) == dict.fromkeys(STATIC, COUNT)
     assert Counter(q.subtask for q in pictured) == {s: n for s, (n, _) in ASKED.items()}
     for number, question in enumerate((*static, *pictured)):
@@ -92,7 +89,7 @@ def test_every_answer_is_derived_again_and_every_other_is_found_out(
         assert "the answer is" in problem
 
 
-def test_what_was_changed_is_found(static: list[Question]) -> None:
+def test_what_was_changed_is_found(static):
     """A text, a scene that is counted over, and options without the right one."""
     for question in static:
         worded = replace(question, text=question.text.replace("the ", "a "))
@@ -105,7 +102,7 @@ def test_what_was_changed_is_found(static: list[Question]) -> None:
             assert problem_of(replace(question, pictures=(picture,))) is not None
 
 
-def test_pictures_of_options_are_whole_and_told_apart(pictured: list[Question]) -> None:
+def test_pictures_of_options_are_whole_and_told_apart(pictured):
     for question in pictured:
         kind = question.wording
         options = [picture for picture in question.pictures if picture.label in LETTERS]
@@ -124,7 +121,7 @@ def test_pictures_of_options_are_whole_and_told_apart(pictured: list[Question]) 
             assert all(len({b.color for b in one.blocks}) == 2 for one in question.pictures)
 
 
-def test_pictures_that_were_changed_are_found_out(pictured: list[Question]) -> None:
+def test_pictures_that_were_changed_are_found_out(pictured):
     """A color that no text names; the right picture in the place of every wrong one."""
     colored = next(q for q in pictured if q.wording == "cf-color")
     places = {
@@ -148,7 +145,7 @@ def test_pictures_that_were_changed_are_found_out(pictured: list[Question]) -> N
     assert problem_of(spoiled) == "4 of 4 options are right"
 
 
-def test_lines_read_back_as_the_questions(static: list[Question], tmp_path: Path) -> None:
+def test_lines_read_back_as_the_questions(static, tmp_path):
     folder = tmp_path / "q"
     write_questions(folder, static, SCENES, question_card("q", "phyblock-400", static, "command"))
     assert [task.question for task in read_questions(folder, DATA).tasks] == static
@@ -158,7 +155,7 @@ def test_lines_read_back_as_the_questions(static: list[Question], tmp_path: Path
         write_questions(folder, static, SCENES, "card")
 
 
-def test_processes_and_other_subtasks_change_nothing_and_the_seed_does() -> None:
+def test_processes_and_other_subtasks_change_nothing_and_the_seed_does():
     def lines(seed: int, jobs: int, *subtasks: Subtask) -> list[str]:
         names = [scene.id for scene in SOME[:8]]
         return lines_of(made(names, dict.fromkeys(subtasks, COUNT), seed, jobs))
@@ -168,7 +165,7 @@ def test_processes_and_other_subtasks_change_nothing_and_the_seed_does() -> None
     assert both == lines(1, 1, "CO") + lines(1, 1, "RP")
 
 
-def test_too_few_scenes_are_told_for_all_subtasks_at_once() -> None:
+def test_too_few_scenes_are_told_for_all_subtasks_at_once():
     with pytest.raises(DataError, match="the scenes give no more than") as told:
         made([SOME[0].id], {"OC": 99, "NU": 99})
     assert [problem.where for problem in told.value.problems] == ["OC", "NU"]
@@ -182,7 +179,7 @@ def built_in() -> QuestionSet:
     return read_questions(FOLDER, DATA)
 
 
-def test_the_built_in_set_is_whole_and_even(built_in: QuestionSet) -> None:
+def test_the_built_in_set_is_whole_and_even(built_in):
     asked = [task.question for task in built_in.tasks]
     counts = {s: MAKERS[s].count for s in SUBTASKS}
     assert Counter(q.subtask for q in asked) == counts | {"AD": 45}
@@ -203,7 +200,7 @@ def test_the_built_in_set_is_whole_and_even(built_in: QuestionSet) -> None:
         assert question_card(FOLDER.name, "phyblock-400", asked, made_by) == shipped
 
 
-def test_answers_of_the_built_in_set_are_derived_again(built_in: QuestionSet) -> None:
+def test_answers_of_the_built_in_set_are_derived_again(built_in):
     asked = [task.question for task in built_in.tasks]
     assert [problem for q in asked[7::70] if (problem := problem_of(q))] == []
     first = next(question for question in asked if question.subtask == "AD")
@@ -213,7 +210,7 @@ def test_answers_of_the_built_in_set_are_derived_again(built_in: QuestionSet) ->
 
 
 @pytest.mark.slow
-def test_every_answer_of_the_built_in_set_is_derived_again(built_in: QuestionSet) -> None:
+def test_every_answer_of_the_built_in_set_is_derived_again(built_in):
     asked = [task.question for task in built_in.tasks]
     assert {q.id: problem for q in asked if (problem := problem_of(q))} == {}
     assert all(problem_of(wrong_answer(question)) is not None for question in asked[3::44])
@@ -236,7 +233,7 @@ SEEN_AS = {
 
 
 @pytest.mark.parametrize("seen_as", SEEN_AS.values(), ids=SEEN_AS)
-def test_colors_of_a_question_are_told_apart_by_everybody(seen_as: np.ndarray) -> None:
+def test_colors_of_a_question_are_told_apart_by_everybody(seen_as):
     drawn = {frozenset(palette(np.random.default_rng(seed))) for seed in range(20)}
     assert len(drawn) == 2
     for colors in drawn:
@@ -267,7 +264,7 @@ def audit_of(questions: list[Question]) -> SubtaskAudit:
     return audit
 
 
-def test_letters_are_counted_and_balance_is_judged(asked: list[Question]) -> None:
+def test_letters_are_counted_and_balance_is_judged(asked):
     even = audit_of([replace(q, answer=(n % 4,)) for n, q in enumerate(of(asked, "SH"))])
     skewed = audit_of([replace(q, answer=(0,)) for q in of(asked, "SH")])
     assert (even.letters, skewed.letters) == ((0.25,) * 4, (1, 0, 0, 0))
@@ -275,7 +272,7 @@ def test_letters_are_counted_and_balance_is_judged(asked: list[Question]) -> Non
     assert any("a letter is right" in finding for finding in skewed.findings())
 
 
-def test_a_repeat_is_found_in_any_order_of_its_options(asked: list[Question]) -> None:
+def test_a_repeat_is_found_in_any_order_of_its_options(asked):
     for subtask in ("SH", "VP", "AD"):
         first = of(asked, subtask)[0]
         found = duplicates_of([first, replace(rotated(first, 1), id="again")])
@@ -283,7 +280,7 @@ def test_a_repeat_is_found_in_any_order_of_its_options(asked: list[Question]) ->
     assert duplicates_of(asked) == {}
 
 
-def test_a_text_or_a_picture_that_gives_the_answer_away_is_a_finding(asked: list[Question]) -> None:
+def test_a_text_or_a_picture_that_gives_the_answer_away_is_a_finding(asked):
     """The cube is always right; the right one of four equal pictures lacks a block."""
     cubes = [
         replace(q, id=f"sh-{n}", answer=(q.options.index("cube"),))

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from phyblock.domain.blocks import BLOCK_TYPES, KIT_PALETTE, SHAPES
 from phyblock.domain.scene import Block, Scene
-from phyblock.domain.symmetry import SYMMETRIES, Symmetry, canonical_form
+from phyblock.domain.symmetry import SYMMETRIES, canonical_form
 from phyblock.making.checks import FORM, PHYSICS, SceneFacts, check_set, findings_of
 from phyblock.making.scenes import designs, production
 from phyblock.making.scenes.designs import BUILDINGS, COMPOSITIONS, CREATURES, beside
@@ -51,7 +51,7 @@ steps = st.lists(
 
 @given(steps)
 @settings(max_examples=40, deadline=None)
-def test_whatever_is_put_down_neither_overlaps_nor_floats(drawn) -> None:
+def test_whatever_is_put_down_neither_overlaps_nor_floats(drawn):
     sketch = Draft(np.random.default_rng(0))
     for block_type, y, x, pose in drawn:
         sketch.put(block_type, y, x, pose)
@@ -75,7 +75,7 @@ def some(group: str, count: int, palette: str = "kit") -> tuple[Request, ...]:
 @given(requests)
 @example(Request(13, "full", "3", 15))
 @settings(deadline=None, max_examples=40)
-def test_what_the_grammar_draws_keeps_its_limits(request_: Request) -> None:
+def test_what_the_grammar_draws_keeps_its_limits(request_):
     scene = draw(request_)
     if scene is not None:
         assert scene.levels == GROUP_LEVELS[request_.group]
@@ -87,7 +87,7 @@ def test_what_the_grammar_draws_keeps_its_limits(request_: Request) -> None:
 
 
 @pytest.mark.parametrize("group", GROUPS)
-def test_most_requests_give_a_scene_and_the_same_one_again(group: str) -> None:
+def test_most_requests_give_a_scene_and_the_same_one_again(group):
     scenes = [draw(Request(1, "kit", group, number)) for number in range(20)]
     assert sum(scene is not None for scene in scenes) >= 12
     production._drawn_base.cache_clear()
@@ -95,7 +95,7 @@ def test_most_requests_give_a_scene_and_the_same_one_again(group: str) -> None:
 
 
 @pytest.mark.parametrize("name", sorted({**BUILDINGS, **CREATURES, **COMPOSITIONS}))
-def test_every_theme_varies(name: str) -> None:
+def test_every_theme_varies(name):
     theme = {**BUILDINGS, **CREATURES, **COMPOSITIONS}[name]
     forms = set()
     for seed in range(10):
@@ -107,7 +107,7 @@ def test_every_theme_varies(name: str) -> None:
     assert len(forms) >= 4
 
 
-def test_a_recolored_scene_is_its_parent_but_for_colors() -> None:
+def test_a_recolored_scene_is_its_parent_but_for_colors():
     for parent in some("3", 6, "full"):
         original = draw(parent)
         varied = draw(Request(5, "full", "3", 0, (parent,)))
@@ -121,7 +121,7 @@ def gray(scene: Scene) -> object:
     return canonical_form([replace(block, color="red") for block in scene.blocks])
 
 
-def test_a_combined_scene_holds_both_parents() -> None:
+def test_a_combined_scene_holds_both_parents():
     parents = some("2", 2)
     scene = next(
         found
@@ -137,7 +137,7 @@ def test_a_combined_scene_holds_both_parents() -> None:
 
 @given(st.integers(0, 3), st.integers(0, 3), st.sampled_from([0.0, 1.0, 2.5]), st.booleans())
 @settings(deadline=None, max_examples=20)
-def test_parts_stand_beside_one_another_with_their_gap(one, other, gap, deep) -> None:
+def test_parts_stand_beside_one_another_with_their_gap(one, other, gap, deep):
     axis = 0 if deep else 1
     parts = [draw(request).blocks for request in (some("2", 4)[one], some("2", 4)[other])]
     row = beside(parts, gap, axis)
@@ -157,7 +157,7 @@ def scenes() -> list[Scene]:
 
 
 @given(st.integers(1, 5000), st.sets(st.integers(1, 4), min_size=1))
-def test_shares_add_up(count: int, levels: set[int]) -> None:
+def test_shares_add_up(count, levels):
     found = shares(count, sorted(levels))
     assert sum(share.base + share.varied for share in found) == count
     assert {level for share in found for level in map(int, share.group.split("+"))} <= levels
@@ -166,8 +166,8 @@ def test_shares_add_up(count: int, levels: set[int]) -> None:
 @pytest.mark.parametrize("every", [3, pytest.param(1, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("engine", installed_engines())
 def test_every_scene_is_accepted_again_in_every_engine_without_its_proof(
-    scenes: list[Scene], engine: str, every: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    scenes, engine, every, monkeypatch
+):
     assert all(is_proven(group) for scene in scenes for group in groups(scene.blocks))
     monkeypatch.setenv("PHYBLOCK_PHYSICS", engine)
     monkeypatch.setattr(dynamics, "is_proven", lambda _: False)
@@ -176,12 +176,12 @@ def test_every_scene_is_accepted_again_in_every_engine_without_its_proof(
         assert hidden_blocks(scene) == ()
 
 
-def test_no_two_scenes_are_the_same_and_variations_name_base_scenes(scenes: list[Scene]) -> None:
+def test_no_two_scenes_are_the_same_and_variations_name_base_scenes(scenes):
     assert check_set(scenes) == ()
     assert any(scene.parents != (scene.id,) for scene in scenes)
 
 
-def test_great_scenes_are_within_their_level_and_stand() -> None:
+def test_great_scenes_are_within_their_level_and_stand():
     drawn = [one for one in (draw(Request(3, "kit", "5", number)) for number in range(3)) if one]
     assert drawn
     for scene in drawn:
@@ -192,7 +192,7 @@ def test_great_scenes_are_within_their_level_and_stand() -> None:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_a_crane_holds_only_where_its_weight_is_there_first(seed: int) -> None:
+def test_a_crane_holds_only_where_its_weight_is_there_first(seed):
     draft = Draft(np.random.default_rng(seed))
     designs._crane(draft)
     beam = next(one.order for one in draft.blocks if one.type == "cuboid3")
@@ -204,7 +204,7 @@ def test_a_crane_holds_only_where_its_weight_is_there_first(seed: int) -> None:
     assert scene_of("crane", (5,), draft.blocks).graph.is_valid(order)
 
 
-def test_splits_share_no_scene_with_one_another_or_with_the_built_in_set() -> None:
+def test_splits_share_no_scene_with_one_another_or_with_the_built_in_set():
     split = {
         name: list(islice(split_tasks(name, 3, levels=levels), count))
         for name, levels, count in (("train", (1, 2, 3, 4), 12), ("dev", (1, 2), 3))
@@ -223,7 +223,7 @@ def test_splits_share_no_scene_with_one_another_or_with_the_built_in_set() -> No
 
 
 @pytest.mark.parametrize(("count", "jobs"), [(20, 1), pytest.param(200, 2, marks=pytest.mark.slow)])
-def test_no_generated_scene_has_a_form_of_the_built_in_set(count: int, jobs: int) -> None:
+def test_no_generated_scene_has_a_form_of_the_built_in_set(count, jobs):
     with open_workers(jobs) as workers:
         production = Production(3, "kit", workers, builtin_forms())
         made = list(production.scenes(shares(count)))
@@ -253,7 +253,7 @@ def apart_m(first: np.ndarray, second: np.ndarray) -> float:
 
 @given(poses, st.sampled_from(SYMMETRIES))
 @settings(deadline=None)
-def test_the_image_of_a_block_fills_the_image_of_its_space(pose, symmetry: Symmetry) -> None:
+def test_the_image_of_a_block_fills_the_image_of_its_space(pose, symmetry):
     block = block_at(*pose)
     (image,) = transformed([block], symmetry)
     # An upright cylinder turned by 90 degrees has its 18 corners halfway between: 4.4 mm away.
@@ -262,7 +262,7 @@ def test_the_image_of_a_block_fills_the_image_of_its_space(pose, symmetry: Symme
 
 
 @pytest.mark.parametrize("symmetry", SYMMETRIES)
-def test_known_poses_map_to_known_poses_one_to_one(symmetry: Symmetry) -> None:
+def test_known_poses_map_to_known_poses_one_to_one(symmetry):
     for kind in BLOCK_TYPES:
         images = [transformed([block_at(kind, e)], symmetry)[0] for e in POSES[kind].values()]
         assert sorted(image.euler_deg for image in images) == sorted(POSES[kind].values())
@@ -270,9 +270,7 @@ def test_known_poses_map_to_known_poses_one_to_one(symmetry: Symmetry) -> None:
 
 @given(structures, st.sampled_from(SYMMETRIES), st.tuples(angles, angles), st.randoms())
 @settings(deadline=None)
-def test_the_form_is_kept_by_turning_mirroring_shifting_and_order(
-    blocks, symmetry, shift, random
-) -> None:
+def test_the_form_is_kept_by_turning_mirroring_shifting_and_order(blocks, symmetry, shift, random):
     step_m = 0.001
     moved = [
         replace(b, position_m=(x + shift[0] * step_m, y + shift[1] * step_m, z))
@@ -285,7 +283,7 @@ def test_the_form_is_kept_by_turning_mirroring_shifting_and_order(
 
 @given(structures, st.integers(0, 50))
 @settings(deadline=None)
-def test_another_color_or_place_is_another_form(blocks, pick: int) -> None:
+def test_another_color_or_place_is_another_form(blocks, pick):
     block = blocks[pick % len(blocks)]
     other = replace(block, color="red" if block.color != "red" else "blue")
     x, y, z = block.position_m
@@ -297,7 +295,7 @@ def test_another_color_or_place_is_another_form(blocks, pick: int) -> None:
 
 @given(structures, st.sampled_from(SYMMETRIES))
 @settings(deadline=None, max_examples=25)
-def test_contacts_are_kept(blocks, symmetry: Symmetry) -> None:
+def test_contacts_are_kept(blocks, symmetry):
     image = transformed(blocks, symmetry)
     assert support_graph(image) == support_graph(blocks)
     assert find_overlaps(image) == find_overlaps(blocks)

@@ -96,7 +96,7 @@ def once(server: BatchServer, count: int) -> bool:
     return len(server.asked) == count and set(server.asked.values()) == {1}
 
 
-def test_a_batch_asks_and_answers_as_single_calls_do(route: str, disk: Disk) -> None:
+def test_a_batch_asks_and_answers_as_single_calls_do(route, disk):
     requests = requests_of(3)
     server, ended = served(route, disk, requests, BatchFaults(lines={0: {1: "length"}}))
     with serving(route) as (other_server, config):
@@ -125,9 +125,7 @@ FAULTS = {
 """By fault of a line: whether the question is asked again, and what comes in the end."""
 
 
-def test_each_line_that_fails_is_asked_again_or_ends_as_a_call_would(
-    route: str, disk: Disk
-) -> None:
+def test_each_line_that_fails_is_asked_again_or_ends_as_a_call_would(route, disk):
     requests = requests_of(len(FAULTS) + 1)
     faults = BatchFaults(lines={0: dict(enumerate(FAULTS))})
     server, ended = served(route, disk, requests, faults)
@@ -140,7 +138,7 @@ def test_each_line_that_fails_is_asked_again_or_ends_as_a_call_would(
     assert len(server.made[1].requests) == 5
 
 
-def test_what_expired_is_asked_again_and_what_was_answered_is_not(route: str, disk: Disk) -> None:
+def test_what_expired_is_asked_again_and_what_was_answered_is_not(route, disk):
     # Of a batch that expired Gemini has no results at all.
     places = range(4) if route == "gemini" else (0, 2)
     faults = BatchFaults(ends={0: "expired"}, lines={0: dict.fromkeys(places, "expired")})
@@ -152,7 +150,7 @@ def test_what_expired_is_asked_again_and_what_was_answered_is_not(route: str, di
     assert {one.billed_usd == one.cost_usd for one in ended if isinstance(one, Reply)} == {True}
 
 
-def test_a_cancelled_batch_keeps_its_answers_and_stops_the_model(route: str, disk: Disk) -> None:
+def test_a_cancelled_batch_keeps_its_answers_and_stops_the_model(route, disk):
     faults = BatchFaults(ends={0: "cancelled"}, lines={0: {1: "cancelled", 2: "cancelled"}})
     requests = requests_of(4)
     with serving(route, faults) as (server, config):
@@ -165,7 +163,7 @@ def test_a_cancelled_batch_keeps_its_answers_and_stops_the_model(route: str, dis
     assert once(server, 4)
 
 
-def test_a_refused_batch_stops_the_model_and_asks_nothing(disk: Disk) -> None:
+def test_a_refused_batch_stops_the_model_and_asks_nothing(disk):
     requests = requests_of(2)
     with serving("direct", BatchFaults(ends={0: "refused"})) as (server, config):
         ended = run_command(config, disk, requests, budget=Budget(1e9))
@@ -186,9 +184,7 @@ CALLS = {
 
 
 @pytest.mark.parametrize("calls", CALLS.values(), ids=list(CALLS))
-def test_calls_that_fail_lose_nothing_and_ask_nothing_twice(
-    route: str, disk: Disk, calls: dict[str, tuple[str, ...]]
-) -> None:
+def test_calls_that_fail_lose_nothing_and_ask_nothing_twice(route, disk, calls):
     server, ended = served(route, disk, requests_of(2), BatchFaults(calls=calls))
     assert len(texts(ended)) == 2
     assert once(server, 2)
@@ -207,8 +203,8 @@ TROUBLE = {
 
 @pytest.mark.parametrize("calls", TROUBLE.values(), ids=list(TROUBLE))
 def test_what_cannot_be_learned_now_stops_the_model_and_is_learned_by_the_next_command(
-    route: str, disk: Disk, calls: dict[str, tuple[str, ...]]
-) -> None:
+    route, disk, calls
+):
     policy = replace(QUICK, attempts=3, max_connection_failures=3)
     requests, budget = requests_of(2), Budget(1e9)
     with serving(route, BatchFaults(calls=calls)) as (server, config):
@@ -219,7 +215,7 @@ def test_what_cannot_be_learned_now_stops_the_model_and_is_learned_by_the_next_c
     assert once(server, 2)
 
 
-def test_a_wrong_key_stops_the_model_and_is_written_nowhere(route: str, disk: Disk) -> None:
+def test_a_wrong_key_stops_the_model_and_is_written_nowhere(route, disk):
     server, ended = served(route, disk, requests_of(2), BatchFaults(key="another"))
     assert isinstance(ended[0], UnavailableError)
     assert "401" in str(ended[0])
@@ -228,9 +224,7 @@ def test_a_wrong_key_stops_the_model_and_is_written_nowhere(route: str, disk: Di
     assert not server.made
 
 
-def test_what_does_not_fit_goes_out_in_further_batches(
-    route: str, disk: Disk, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_does_not_fit_goes_out_in_further_batches(route, disk, monkeypatch):
     config = config_at(route, "http://localhost:9")
     kind = type(PROVIDERS[config.provider](config))
     monkeypatch.setattr(kind, "most_requests", 2)
@@ -248,9 +242,7 @@ def test_what_does_not_fit_goes_out_in_further_batches(
 
 
 @pytest.mark.parametrize(("shares", "first"), [(2.5, 2), (0.5, 0)])
-def test_a_cost_limit_is_kept_by_the_dearest_case_of_what_is_sent(
-    disk: Disk, shares: float, first: int
-) -> None:
+def test_a_cost_limit_is_kept_by_the_dearest_case_of_what_is_sent(disk, shares, first):
     """The limit is so many requests at their dearest; what is left of it pays for the next."""
     requests = requests_of(4)
     free = Disk(disk.folder / "free")
@@ -266,7 +258,7 @@ def test_a_cost_limit_is_kept_by_the_dearest_case_of_what_is_sent(
     assert first or isinstance(ended[0], BudgetReachedError)
 
 
-def test_what_is_in_the_cache_is_not_asked_and_answers_go_there(route: str, tmp_path: Path) -> None:
+def test_what_is_in_the_cache_is_not_asked_and_answers_go_there(route, tmp_path):
     """Batched or not, it is the same question; what it cost is what it was asked for as."""
     cache = tmp_path / "replies.sqlite"
     requests = requests_of(2)
@@ -288,9 +280,7 @@ def test_what_is_in_the_cache_is_not_asked_and_answers_go_there(route: str, tmp_
 
 # What a kill cuts off in litellm is closed when it is collected.
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
-def test_a_kill_at_any_moment_loses_nothing_and_asks_nothing_twice(
-    route: str, tmp_path: Path
-) -> None:
+def test_a_kill_at_any_moment_loses_nothing_and_asks_nothing_twice(route, tmp_path):
     requests = requests_of(2)
     moments = None
     for at in itertools.count():
@@ -311,7 +301,7 @@ def test_a_kill_at_any_moment_loses_nothing_and_asks_nothing_twice(
     assert moments >= 14
 
 
-def test_rejected_requests_are_asked_again_only_when_that_is_wanted(disk: Disk) -> None:
+def test_rejected_requests_are_asked_again_only_when_that_is_wanted(disk):
     requests = requests_of(1)
     with serving("direct", BatchFaults(lines={0: {0: "400"}})) as (server, config):
         assert isinstance(run_command(config, disk, requests)[0], SampleError)
@@ -343,9 +333,7 @@ json_values = st.recursive(
 
 
 @given(st.lists(st.tuples(keys, fates)))
-def test_a_request_is_in_the_last_batch_that_was_not_lost(
-    batches: list[tuple[list[str], str]],
-) -> None:
+def test_a_request_is_in_the_last_batch_that_was_not_lost(batches):
     def line(n: int, event: str, **fields: Any) -> BatchLine:
         told = {"batch": f"t{n}", "model": "m", "event": event, "time": "2026-11-23T10:00:00Z"}
         return BatchLine.model_validate({**told, **fields})
@@ -377,9 +365,7 @@ def result_lines(draw: st.DrawFn) -> list[tuple[str, Any]]:
 
 
 @given(lines=result_lines(), requests=st.integers(0, 4))
-def test_the_first_whole_line_of_a_request_answers_it(
-    lines: list[tuple[str, bool]], requests: int
-) -> None:
+def test_the_first_whole_line_of_a_request_answers_it(lines, requests):
     whole = [
         json.dumps({"custom_id": name, "response": {"status_code": 200, "body": {"n": n}}})
         for n, (name, _) in enumerate(lines)
@@ -396,11 +382,11 @@ def test_the_first_whole_line_of_a_request_answers_it(
         answer = answers.get(str(place))
         assert (answer is not None) == bool(first)
         if answer is not None:
-            assert json.loads(answer.body) == {"n": first[0]}  # type: ignore[union-attr]
+            assert json.loads(answer.body) == {"n": first[0]}
 
 
 @given(st.sampled_from(["openai", "anthropic", "gemini"]), json_values)
-def test_any_line_and_any_status_is_read_or_has_not_its_form(name: str, raw: Any) -> None:
+def test_any_line_and_any_status_is_read_or_has_not_its_form(name, raw):
     provider = PROVIDERS[name](ModelConfig(name="m", id=f"{name}/m"))
     for read in (provider.read, provider._read_status, provider._read_page):
         with contextlib.suppress(*UNREADABLE):
@@ -408,14 +394,14 @@ def test_any_line_and_any_status_is_read_or_has_not_its_form(name: str, raw: Any
 
 
 @given(st.dictionaries(st.text(), values, max_size=3), st.text(min_size=1), values)
-def test_bodies_stand_in_lines_as_they_are(fields: dict[str, Any], name: str, body: Any) -> None:
+def test_bodies_stand_in_lines_as_they_are(fields, name, body):
     fields.pop(name, None)
     line = _joined(fields, name, json.dumps(body).encode())
     assert json.loads(line) == {**fields, name: body}
     assert b"\n" not in line
 
 
-def test_results_that_are_not_there_yet_are_not_taken_for_none(disk: Disk) -> None:
+def test_results_that_are_not_there_yet_are_not_taken_for_none(disk):
     class Late(OpenAIBatches):
         def told(self, made: Made) -> dict[str, Any]:
             is_early = made.looks <= self.batch_faults.looks
@@ -426,7 +412,7 @@ def test_results_that_are_not_there_yet_are_not_taken_for_none(disk: Disk) -> No
     assert len(server.made) == 1
 
 
-def test_headers_that_requests_need_go_with_their_batch(disk: Disk) -> None:
+def test_headers_that_requests_need_go_with_their_batch(disk):
     schema = {"type": "object", "properties": {}, "additionalProperties": False}
     form = {"type": "json_schema", "json_schema": {"name": "a", "strict": True, "schema": schema}}
     betas: list[str] = []

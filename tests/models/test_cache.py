@@ -70,9 +70,7 @@ def what_decides(config: ModelConfig, request: Request) -> object:
 
 
 @given(configs, requests, configs, requests)
-def test_keys_are_equal_when_all_that_decides_is_equal(
-    config: ModelConfig, request: Request, other_config: ModelConfig, other: Request
-) -> None:
+def test_keys_are_equal_when_all_that_decides_is_equal(config, request, other_config, other):
     same = what_decides(config, request) == what_decides(other_config, other)
     assert (reply_key(config, request) == reply_key(other_config, other)) == same
 
@@ -87,7 +85,7 @@ def test_keys_are_equal_when_all_that_decides_is_equal(
         {"temperature": 0.5},
     ],
 )
-def test_what_does_not_change_a_reply_does_not_change_the_key(fields: dict[str, Any]) -> None:
+def test_what_does_not_change_a_reply_does_not_change_the_key(fields):
     asked = replace(make_request(), key="another")
     assert reply_key(with_fields(CONFIG, **fields), asked) == reply_key(CONFIG, make_request())
 
@@ -113,7 +111,7 @@ KEPT: dict[str, dict[str, Any]] = {
 
 
 @pytest.mark.parametrize("key", KEPT)
-def test_the_keys_of_kept_replies_stay(key: str) -> None:
+def test_the_keys_of_kept_replies_stay(key):
     goal = Image(b"\x89PNG\r\n\x1a\ngoal", "goal", 8, 8)
     request = Request(
         "l2-001",
@@ -127,7 +125,7 @@ def test_the_keys_of_kept_replies_stay(key: str) -> None:
     assert reply_key(ModelConfig(name="m", **KEPT[key]), request) == key
 
 
-def test_a_reply_comes_back_whole_and_marked(tmp_path: Path) -> None:
+def test_a_reply_comes_back_whole_and_marked(tmp_path):
     with ReplyCache(tmp_path / "deep" / "replies.sqlite") as cache:
         assert cache.get("k") is None
         assert cache.put(
@@ -142,7 +140,7 @@ def test_a_reply_comes_back_whole_and_marked(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "content", [b"this is not a database at all, but long enough to look at" * 40, b"SQLite"]
 )
-def test_a_file_that_is_no_cache_is_one_clear_error(tmp_path: Path, content: bytes) -> None:
+def test_a_file_that_is_no_cache_is_one_clear_error(tmp_path, content):
     path = tmp_path / "c.sqlite"
     path.write_bytes(content)
     with pytest.raises(StoreError) as caught:
@@ -163,9 +161,7 @@ def test_a_file_that_is_no_cache_is_one_clear_error(tmp_path: Path, content: byt
         7,
     ],
 )
-def test_a_row_that_is_no_reply_is_missing_and_is_overwritten(
-    tmp_path: Path, content: str | bytes | int
-) -> None:
+def test_a_row_that_is_no_reply_is_missing_and_is_overwritten(tmp_path, content):
     said: list[str] = []
     path = tmp_path / "c.sqlite"
     with ReplyCache(path) as cache:
@@ -205,7 +201,7 @@ def writer(path: Path, name: str, count: int) -> subprocess.Popen[str]:
     )
 
 
-def test_processes_share_one_file(tmp_path: Path) -> None:
+def test_processes_share_one_file(tmp_path):
     path = tmp_path / "c.sqlite"
     writers = [writer(path, name, 100) for name in "ab"]
     for process in writers:
@@ -216,7 +212,7 @@ def test_processes_share_one_file(tmp_path: Path) -> None:
         assert all(cache.get(f"{name}-{n}") for name in "ab" for n in range(100))
 
 
-def test_what_two_samples_ask_at_the_same_time_is_asked_once(tmp_path: Path) -> None:
+def test_what_two_samples_ask_at_the_same_time_is_asked_once(tmp_path):
     server = ROUTES["direct"].server(Faults(latency_s=0.05))
     with Running(server) as running, ReplyCache(tmp_path / "c.sqlite") as cache:
         config = ROUTES["direct"].config(running.url)
@@ -225,7 +221,7 @@ def test_what_two_samples_ask_at_the_same_time_is_asked_once(tmp_path: Path) -> 
     assert [answer.cached for answer in answers if isinstance(answer, Reply)].count(True) == 4
 
 
-def test_what_was_kept_survives_a_kill(tmp_path: Path) -> None:
+def test_what_was_kept_survives_a_kill(tmp_path):
     path = tmp_path / "c.sqlite"
     process = writer(path, "a", 10**6)
     assert process.stdout is not None

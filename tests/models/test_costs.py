@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import functools
-from pathlib import Path
-from typing import Any
 
 import pytest
 from hypothesis import given
@@ -46,7 +44,7 @@ from tests.servers.openai_chat import OpenAIChat
 
 
 def config(model_id: str, **fields: object) -> ModelConfig:
-    return ModelConfig(name="m", id=model_id, **fields)  # type: ignore[arg-type]
+    return ModelConfig(name="m", id=model_id, **fields)
 
 
 def request_of(*parts: str | Image, **params: object) -> Request:
@@ -81,7 +79,7 @@ hosted_vllm/Qwen/Qwen3-VL-8B-Instruct 1024 512 514
 """Model, with the detail that is asked for, width, height [pixels], tokens."""
 
 
-def test_a_picture_counts_as_its_model_counts_it() -> None:
+def test_a_picture_counts_as_its_model_counts_it():
     words = PICTURES.split()
     for model, width, height, tokens in zip(*(words[n::4] for n in range(4)), strict=True):
         model_id, _, detail = model.partition(":")
@@ -95,7 +93,7 @@ def test_a_picture_counts_as_its_model_counts_it() -> None:
     st.integers(1, 6000),
     st.integers(1, 6000),
 )
-def test_every_picture_counts_and_none_without_bound(model: str, width: int, height: int) -> None:
+def test_every_picture_counts_and_none_without_bound(model, width, height):
     tokens = picture_tokens(f"x/{model}", Image(b"", "goal", width, height))
     assert 1 <= tokens <= 36_000
     assert tokens == picture_tokens(f"x/{model}", Image(b"", "goal", height, width))
@@ -112,14 +110,12 @@ def test_every_picture_counts_and_none_without_bound(model: str, width: int, hei
         ("openai/gpt-4o-2024-08-06", {}, 500, 16384),
     ],
 )
-def test_a_reply_is_as_long_as_the_model_thinks_and_may_say(
-    model_id: str, params: dict[str, Any], usual: int, most: int
-) -> None:
+def test_a_reply_is_as_long_as_the_model_thinks_and_may_say(model_id, params, usual, most):
     expected = estimate(config(model_id), request_of("a", **params))
     assert (expected.completion_tokens, expected.most_completion_tokens) == (usual, most)
 
 
-def test_a_local_server_is_free_only_where_no_key_is_sent(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_local_server_is_free_only_where_no_key_is_sent(monkeypatch):
     monkeypatch.delenv("HOSTED_VLLM_API_KEY", raising=False)
     local = config("hosted_vllm/x", api_base="http://127.0.0.1:9/v1")
     assert not is_billed(local)
@@ -128,7 +124,7 @@ def test_a_local_server_is_free_only_where_no_key_is_sent(monkeypatch: pytest.Mo
     assert is_billed(config("openai/nobodys"))
 
 
-def test_a_model_without_a_price_under_a_budget_is_an_error_at_the_start() -> None:
+def test_a_model_without_a_price_under_a_budget_is_an_error_at_the_start():
     with pytest.raises(SpecError, match="no known price"):
         build_model(config("openai/nobodys"), cache=None, budget=Budget(1.0))
 
@@ -137,9 +133,7 @@ def test_a_model_without_a_price_under_a_budget_is_an_error_at_the_start() -> No
     st.floats(0.1, 10),
     st.lists(st.tuples(st.floats(0.01, 3), st.floats(0, 1), st.integers(0, 3)), max_size=30),
 )
-def test_a_budget_is_never_passed_and_stops_only_when_nothing_more_fits(
-    limit: float, calls: list[tuple[float, float, int]]
-) -> None:
+def test_a_budget_is_never_passed_and_stops_only_when_nothing_more_fits(limit, calls):
     async def main() -> None:
         budget = Budget(limit)
         own = budget.of("m")
@@ -174,9 +168,7 @@ strange = st.one_of(
 
 
 @given(strange, strange, strange, st.integers(1, 10**5), st.integers(1, 10**5), st.booleans())
-def test_only_counts_that_can_be_true_are_known(
-    prompt: Any, completion: Any, reasoning: Any, asked: int, most: int, said: bool
-) -> None:
+def test_only_counts_that_can_be_true_are_known(prompt, completion, reasoning, asked, most, said):
     counts = {
         "prompt_tokens": prompt,
         "completion_tokens": completion,
@@ -203,9 +195,7 @@ def test_only_counts_that_can_be_true_are_known(
     st.lists(st.tuples(st.integers(1, 90_000), st.integers(1, 9000)), min_size=1, max_size=40),
     st.integers(1, 16),
 )
-def test_a_call_costs_no_more_than_was_held_once_a_reply_like_it_has_come(
-    limit: float, told: list[tuple[int, int]], width: int
-) -> None:
+def test_a_call_costs_no_more_than_was_held_once_a_reply_like_it_has_come(limit, told, width):
     """Whatever a server counts, the limit is passed at most by calls that were under way then.
 
     The first call is alone, and never are more under way than one more than were answered.
@@ -250,9 +240,7 @@ amounts = st.one_of(st.none(), st.floats(), st.floats(0, 2))
 
 
 @given(st.lists(st.tuples(st.floats(0.01, 2), amounts), max_size=30))
-def test_what_was_spent_never_becomes_less_and_an_unknown_cost_is_the_dearest(
-    calls: list[tuple[float, float | None]],
-) -> None:
+def test_what_was_spent_never_becomes_less_and_an_unknown_cost_is_the_dearest(calls):
     async def main() -> None:
         budget = Budget(1000.0)
         own = budget.of("m")
@@ -271,7 +259,7 @@ def test_what_was_spent_never_becomes_less_and_an_unknown_cost_is_the_dearest(
 
 
 @given(st.lists(st.tuples(st.integers(0, 5000), st.none() | st.integers(0, 10**9)), max_size=20))
-def test_what_is_learned_stays_within_bounds(counts: list[tuple[int, int | None]]) -> None:
+def test_what_is_learned_stays_within_bounds(counts):
     own = Budget(1.0).of("m", Tariff(input=1.0, output=1.0))
     expected = Estimate(1000, 100, 100)
     plain = own.most_usd(expected) or 0.0
@@ -294,7 +282,7 @@ def test_what_is_learned_stays_within_bounds(counts: list[tuple[int, int | None]
     ],
     ids=["none", "zero", "negative", "absurd"],
 )
-def test_a_server_that_does_not_count_stops_within_the_limit(route: str, usage: object) -> None:
+def test_a_server_that_does_not_count_stops_within_the_limit(route, usage):
     server = OpenAIChat(usage=usage)
     budget = Budget(0.1)
     with Running(server) as running:
@@ -324,9 +312,7 @@ def test_a_server_that_does_not_count_stops_within_the_limit(route: str, usage: 
 
 
 @pytest.mark.parametrize(("mode", "is_counted"), [("html", True), ("reset", True), ("500", False)])
-def test_a_failure_that_may_have_been_billed_counts_against_the_budget(
-    mode: str, is_counted: bool
-) -> None:
+def test_a_failure_that_may_have_been_billed_counts_against_the_budget(mode, is_counted):
     budget = Budget(100.0)
     with Running(ROUTES["direct"].server(Faults(mode=mode))) as running:
         model = make_model(
@@ -339,7 +325,7 @@ def test_a_failure_that_may_have_been_billed_counts_against_the_budget(
     assert answer.billed_usd == pytest.approx(budget.spent_usd)
 
 
-def test_a_reply_says_what_the_limit_counts_for_all_its_attempts(tmp_path: Path) -> None:
+def test_a_reply_says_what_the_limit_counts_for_all_its_attempts(tmp_path):
     server = ROUTES["direct"].server(Faults(reset=0.2, malformed=0.2, server_error=0.2))
     requests = [make_request(f"{n:03}") for n in range(30)]
     with Running(server) as running, ReplyCache(tmp_path / "c.sqlite") as cache:
@@ -347,10 +333,10 @@ def test_a_reply_says_what_the_limit_counts_for_all_its_attempts(tmp_path: Path)
         budget = Budget(100.0)
         replies = ask(make_model(config, cache=cache, budget=budget), *requests)
         again = ask(make_model(config, cache=cache, budget=Budget(1.0)), *requests)
-    billed = [reply.billed_usd for reply in replies]  # type: ignore[union-attr]
+    billed = [reply.billed_usd for reply in replies]
     assert sum(usd or 0.0 for usd in billed) == pytest.approx(budget.spent_usd)
     assert max(usd or 0.0 for usd in billed) > min(usd or 0.0 for usd in billed) > 0
-    assert {reply.billed_usd for reply in again} == {None}  # type: ignore[union-attr]
+    assert {reply.billed_usd for reply in again} == {None}
 
 
 usd = st.floats(0, 100)
@@ -365,9 +351,7 @@ prices = st.builds(Price, input=usd, output=usd, cached=maybe, cache_write=maybe
     st.integers(0, 10**6),
     st.integers(0, 10**9),
 )
-def test_each_prompt_token_is_paid_once(
-    price: Price, fresh: int, cached: int, written: int, out: int
-) -> None:
+def test_each_prompt_token_is_paid_once(price, fresh, cached, written, out):
     usage = Usage(
         prompt_tokens=fresh + cached + written,
         completion_tokens=out,
@@ -388,9 +372,7 @@ def test_each_prompt_token_is_paid_once(
     st.integers(0, 400_000),
     st.booleans(),
 )
-def test_the_highest_tier_below_the_prompt_holds(
-    tiers: list[tuple[int, Price]], base: Price, prompt: int, batched: bool
-) -> None:
+def test_the_highest_tier_below_the_prompt_holds(tiers, base, prompt, batched):
     told = [Tier(above=n, **dict(p)) for n, p in sorted(tiers, key=lambda t: t[0])]
     tariff = Tariff(**dict(base), tiers=tuple(told))
     found = price_at(tariff, prompt, batched=batched)
@@ -408,9 +390,7 @@ def test_the_highest_tier_below_the_prompt_holds(
         ("gemini/mine", {}, True),
     ],
 )
-def test_batches_cost_half_only_where_that_is_known(
-    model_id: str, fields: dict[str, Any], is_half: bool
-) -> None:
+def test_batches_cost_half_only_where_that_is_known(model_id, fields, is_half):
     whole = {"input": 8.0, "output": 40.0, "cached": 1.0}
     half = {name: usd / 2 for name, usd in whole.items()}
     served = config(model_id, batch=True, **fields)
@@ -427,9 +407,7 @@ def test_batches_cost_half_only_where_that_is_known(
 
 
 @given(prices, st.integers(0, 10**6), st.integers(0, 10**5), st.data())
-def test_no_call_costs_more_than_the_most(
-    price: Price, prompt: int, completion: int, data: st.DataObject
-) -> None:
+def test_no_call_costs_more_than_the_most(price, prompt, completion, data):
     batched = data.draw(st.booleans())
     tariff = Tariff(**dict(price), tiers=(Tier(above=100_000, input=50.0, output=60.0),))
     most = most_usd(tariff, prompt, completion, batched=batched)
@@ -451,9 +429,7 @@ def test_no_call_costs_more_than_the_most(
         ("azure/gpt-4.1", 10, ("", "")),
     ],
 )
-def test_tiers_batches_and_caches_are_priced_as_the_map_says(
-    model_id: str, prompt: int, names: tuple[str, str]
-) -> None:
+def test_tiers_batches_and_caches_are_priced_as_the_map_says(model_id, prompt, names):
     entry = map_entry(config(model_id))
     known = tariff_of(config(model_id))
     assert known is not None

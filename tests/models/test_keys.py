@@ -25,7 +25,7 @@ def _no_keys(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def config(model_id: str, **fields: object) -> ModelConfig:
-    return ModelConfig(name="m", id=model_id, **fields)  # type: ignore[arg-type]
+    return ModelConfig(name="m", id=model_id, **fields)
 
 
 @pytest.mark.parametrize(
@@ -44,11 +44,11 @@ def config(model_id: str, **fields: object) -> ModelConfig:
         (ModelConfig(name="oracle"), KeyStatus((), False, False)),
     ],
 )
-def test_what_a_model_needs(model: ModelConfig, status: KeyStatus) -> None:
+def test_what_a_model_needs(model, status):
     assert api_key_status(model) == status
 
 
-def test_a_key_that_is_needed_and_not_set_stops_the_model_before_any_call() -> None:
+def test_a_key_that_is_needed_and_not_set_stops_the_model_before_any_call():
     with pytest.raises(UnavailableError, match="set GEMINI_API_KEY or GOOGLE_API_KEY"):
         api_key(config("gemini/g"))
     with pytest.raises(UnavailableError, match="set MINE_API_KEY"):
@@ -56,7 +56,7 @@ def test_a_key_that_is_needed_and_not_set_stops_the_model_before_any_call() -> N
 
 
 @pytest.mark.parametrize("value", ["", " ", "abc", "EMPTY", "no-key"])
-def test_a_placeholder_is_no_secret(monkeypatch: pytest.MonkeyPatch, value: str) -> None:
+def test_a_placeholder_is_no_secret(monkeypatch, value):
     monkeypatch.setenv("OPENAI_API_KEY", value)
     assert secrets_of(config("openai/o1")) == ()
 
@@ -66,7 +66,7 @@ KEYS = st.text(PRINTABLE, min_size=8, max_size=60)
 
 
 @given(KEYS, st.text(max_size=8), st.text(max_size=8))
-def test_a_key_is_hidden_in_every_form(key: str, before: str, after: str) -> None:
+def test_a_key_is_hidden_in_every_form(key, before, after):
     forms = [
         key,
         json.dumps(key)[1:-1],
@@ -85,7 +85,7 @@ def test_a_key_is_hidden_in_every_form(key: str, before: str, after: str) -> Non
 
 
 @given(KEYS, st.text(PRINTABLE.filter(lambda c: c != ":"), max_size=9))
-def test_a_key_is_hidden_in_basic_credentials(key: str, user: str) -> None:
+def test_a_key_is_hidden_in_basic_credentials(key, user):
     credentials = base64.b64encode(f"{user}:{key}".encode()).decode()
     left = hidden(f"got {credentials}", (key,), guess=False).partition("[key]")
     assert left[1]
@@ -98,21 +98,19 @@ def test_a_key_is_hidden_in_basic_credentials(key: str, user: str) -> None:
 
 
 @given(KEYS, st.integers(min_value=4))
-def test_a_key_that_is_cut_at_the_end_is_hidden(key: str, length: int) -> None:
+def test_a_key_that_is_cut_at_the_end_is_hidden(key, length):
     part = key[: min(length, len(key) - 1)]
     assert not hidden(f"bad key {part}", (key,)).endswith(part)
 
 
-def test_a_short_key_is_hidden_as_a_word_and_not_inside_of_others() -> None:
+def test_a_short_key_is_hidden_as_a_word_and_not_inside_of_others():
     assert hidden("key s3cr! of s3cr, not xs3cr or s3crets", ("s3cr",)) == (
         "key [key]! of [key], not xs3cr or s3crets"
     )
 
 
 @pytest.mark.parametrize("bad", ["a-key\nof-mine", "a-key\x7fof-mine", "a-k\u00e9y-of-mine"])
-def test_a_key_that_cannot_be_sent_is_named_by_its_variable(
-    monkeypatch: pytest.MonkeyPatch, bad: str
-) -> None:
+def test_a_key_that_cannot_be_sent_is_named_by_its_variable(monkeypatch, bad):
     monkeypatch.setenv("OPENAI_API_KEY", bad)
     with pytest.raises(UnavailableError, match="OPENAI_API_KEY holds") as refused:
         api_key(config("openai/o1"))
@@ -136,8 +134,8 @@ def test_a_key_that_cannot_be_sent_is_named_by_its_variable(
 )
 @pytest.mark.parametrize("api_key_env", [None, "MINE_API_KEY"])
 def test_whatever_a_provider_signs_in_with_is_a_secret_and_no_key(
-    monkeypatch: pytest.MonkeyPatch, model_id: str, variable: str, api_key_env: str | None
-) -> None:
+    monkeypatch, model_id, variable, api_key_env
+):
     monkeypatch.setenv(variable, "a-long-secret-of-mine")
     config = ModelConfig(name="m", id=model_id, api_key_env=api_key_env)
     assert "a-long-secret-of-mine" in secrets_of(config)

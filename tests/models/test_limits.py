@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import heapq
 import itertools
-from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
@@ -46,7 +45,7 @@ class FakeTime:
         await wake
 
     async def run_until_done(self, *tasks: asyncio.Task[None]) -> None:
-        ready = asyncio.get_running_loop()._ready  # type: ignore[attr-defined]
+        ready = asyncio.get_running_loop()._ready
         while not all(task.done() for task in tasks):
             await asyncio.sleep(0)
             while ready:
@@ -77,9 +76,7 @@ calls = st.lists(
 
 @settings(max_examples=100, deadline=None)
 @given(calls, st.integers(1, 10), st.integers(100, 500), st.integers(1, 8))
-def test_no_window_of_a_minute_has_more_starts_or_tokens_than_allowed(
-    arrivals: list[tuple[float, int, float]], rpm: int, tpm: int, width: int
-) -> None:
+def test_no_window_of_a_minute_has_more_starts_or_tokens_than_allowed(arrivals, rpm, tpm, width):
     starts: list[tuple[float, int]] = []
     inside = 0
 
@@ -127,16 +124,16 @@ def starts_of(tpm: int, *calls: tuple[int, int]) -> list[float]:
     return run(main)
 
 
-def test_tokens_really_taken_replace_the_estimate() -> None:
+def test_tokens_really_taken_replace_the_estimate():
     assert starts_of(100, (90, 10), (20, 20), (80, 80)) == [0, 0, WINDOW_S]
     assert starts_of(100, (10, 90), (20, 20)) == [0, WINDOW_S]
 
 
-def test_a_request_larger_than_the_limit_waits_for_an_empty_window_only() -> None:
+def test_a_request_larger_than_the_limit_waits_for_an_empty_window_only():
     assert starts_of(100, (500, 500), (1, 1), (500, 500)) == [0, WINDOW_S, 2 * WINDOW_S]
 
 
-def test_a_model_waiting_for_its_minute_holds_no_place_that_another_could_use() -> None:
+def test_a_model_waiting_for_its_minute_holds_no_place_that_another_could_use():
     async def main() -> float:
         time = FakeTime()
         overall = asyncio.Semaphore(1)
@@ -160,7 +157,7 @@ def test_a_model_waiting_for_its_minute_holds_no_place_that_another_could_use() 
 
 @settings(max_examples=100, deadline=None)
 @given(st.lists(st.tuples(st.integers(0, 5), st.booleans()), max_size=30), st.integers(1, 4))
-def test_limits_survive_those_that_give_up(plans: list[tuple[int, bool]], width: int) -> None:
+def test_limits_survive_those_that_give_up(plans, width):
     """However many hold or wait and are cancelled, all places are free in the end."""
 
     async def main() -> None:
@@ -219,7 +216,7 @@ class Script:
 
     def run(self, **policy: float) -> str:
         clock = Clock(lambda: self.now_s, self.sleep)
-        rules = RetryPolicy(clock=clock, **policy)  # type: ignore[arg-type]
+        rules = RetryPolicy(clock=clock, **policy)
 
         async def main() -> str:
             async for attempt in rules.retrying(lambda _, wait_s: self.told.append(wait_s)):
@@ -242,7 +239,7 @@ class Script:
         asyncio.CancelledError(),
     ],
 )
-def test_nothing_but_a_retryable_error_is_sent_again(error: Exception) -> None:
+def test_nothing_but_a_retryable_error_is_sent_again(error):
     script = Script(error)
     with pytest.raises(type(error)):
         script.run()
@@ -260,8 +257,8 @@ statuses = st.sampled_from([None, 408, 429, 500, 502, 503])
     st.floats(0, 400, allow_nan=False),
 )
 def test_a_request_is_given_up_when_both_number_and_time_are_over(
-    found: list[int | None], attempts: int, retry_for_s: float, takes_s: float
-) -> None:
+    found, attempts, retry_for_s, takes_s
+):
     errors = (RetryableError("x", status=status) for status in found * 400)
     script = Script(*errors, takes_s=takes_s)
     with pytest.raises(RetryableError):
@@ -273,9 +270,7 @@ def test_a_request_is_given_up_when_both_number_and_time_are_over(
 
 
 @pytest.mark.parametrize("status", [200, 201, 204])
-def test_answers_that_were_paid_for_and_cannot_be_read_are_bounded_by_number_alone(
-    status: int,
-) -> None:
+def test_answers_that_were_paid_for_and_cannot_be_read_are_bounded_by_number_alone(status):
     script = Script(*(RetryableError("malformed", status=status) for _ in range(20)))
     with pytest.raises(RetryableError, match="malformed"):
         script.run(attempts=3)
@@ -283,7 +278,7 @@ def test_answers_that_were_paid_for_and_cannot_be_read_are_bounded_by_number_alo
 
 
 @given(st.lists(st.none() | st.floats(0, 500, allow_nan=False), min_size=1, max_size=7))
-def test_waits_keep_to_retry_after_and_to_their_bounds(wishes: list[float | None]) -> None:
+def test_waits_keep_to_retry_after_and_to_their_bounds(wishes):
     script = Script(*(RetryableError("429", status=429, retry_after_s=wish) for wish in wishes))
     assert script.run() == "answer"
     assert len(script.waits) == len(wishes)
@@ -295,8 +290,8 @@ def test_waits_keep_to_retry_after_and_to_their_bounds(wishes: list[float | None
 @pytest.mark.parametrize("route", ["direct", "openai"])
 @pytest.mark.parametrize("cancels", [1, 2])
 def test_a_request_under_way_is_answered_and_a_second_cancellation_gives_it_up(
-    tmp_path: Path, route: str, cancels: int
-) -> None:
+    tmp_path, route, cancels
+):
     server = ROUTES[route].server(Faults(latency_s=0.2))
     budget = Budget(100.0)
 
@@ -328,9 +323,7 @@ def test_a_request_under_way_is_answered_and_a_second_cancellation_gives_it_up(
 
 
 @pytest.mark.parametrize("where", ["slot", "minute", "budget", "retry", "rest"])
-def test_whatever_is_waited_for_a_cancellation_ends_the_wait_and_nothing_is_sent(
-    where: str,
-) -> None:
+def test_whatever_is_waited_for_a_cancellation_ends_the_wait_and_nothing_is_sent(where):
     mode = {"retry": "429", "rest": "429"}.get(where, "slow")
     server = ROUTES["direct"].server(Faults(mode=mode, retry_after="100"))
     fields = {"slot": {"max_concurrency": 1}, "minute": {"rpm": 1}}.get(where, {})
@@ -362,7 +355,7 @@ def test_whatever_is_waited_for_a_cancellation_ends_the_wait_and_nothing_is_sent
     assert server.requests == 1
 
 
-def test_a_bug_of_ours_is_neither_sent_again_nor_charged(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_bug_of_ours_is_neither_sent_again_nor_charged(monkeypatch):
     calls = 0
 
     async def broken(*_: object, **__: object) -> None:

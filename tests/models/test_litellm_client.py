@@ -126,9 +126,7 @@ def answer_of(model_id: str, **fields: Any) -> Reply | ModelError | None:
 
 
 @pytest.mark.parametrize("model_id", PROVIDERS)
-def test_a_provider_sends_through_our_client_to_its_server_or_not_at_all(
-    model_id: str, sends: list[str], hosts: set[str]
-) -> None:
+def test_a_provider_sends_through_our_client_to_its_server_or_not_at_all(model_id, sends, hosts):
     server = AnyPath(500, b'{"x": 1}')
     with Running(server) as running:
         answer = answer_of(model_id, api_base=running.url, api_key_env=KEY_VARIABLE)
@@ -145,9 +143,7 @@ def test_a_provider_sends_through_our_client_to_its_server_or_not_at_all(
         assert (answer.status, server.hits) == (500, 1)
 
 
-def test_what_is_missing_on_this_machine_is_no_outage(
-    monkeypatch: pytest.MonkeyPatch, hosts: set[str]
-) -> None:
+def test_what_is_missing_on_this_machine_is_no_outage(monkeypatch, hosts):
     for name in ("AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY", "AWS_PROFILE", "HOME"):
         monkeypatch.delenv(name, raising=False)
     for model_id in ("vertex_ai/gemini-2.0-flash", "sagemaker/m", "bedrock/m"):
@@ -189,9 +185,7 @@ def methods() -> dict[str, object]:
 
 
 @pytest.mark.parametrize("mode", ["ok", "429", "401", "cut", "seed"])
-def test_calls_change_no_setting_logger_variable_or_class_of_the_callers_libraries(
-    mode: str,
-) -> None:
+def test_calls_change_no_setting_logger_variable_or_class_of_the_callers_libraries(mode):
     import litellm
 
     litellm.suppress_debug_info = True
@@ -234,7 +228,7 @@ print(litellm.suppress_debug_info, litellm.drop_params, litellm.num_retries)
 """
 
 
-def test_the_first_call_imports_litellm_quietly_and_reads_no_key_file(tmp_path: Path) -> None:
+def test_the_first_call_imports_litellm_quietly_and_reads_no_key_file(tmp_path):
     (tmp_path / ".env").write_text("FROM_DOTENV=1\nGEMINI_API_KEY=sk-from-a-file-12345\n")
     # In its mode "DEV", litellm would read keys from any .env file above.
     environment = {"PYTHONPATH": str(ROOT), "PATH": "", "LITELLM_MODE": "DEV"}
@@ -291,11 +285,11 @@ def faults(models: Mapping[str, ModelConfig]) -> Iterator[str]:
             yield f"{name} ({asked.id}) is shown no pictures, or does not chat"
 
 
-def test_current_models_are_served_and_look_at_pictures() -> None:
+def test_current_models_are_served_and_look_at_pictures():
     assert list(faults(of_group("frontier") | of_group("open"))) == []
 
 
-def test_every_model_is_in_a_group_and_every_line_is_there() -> None:
+def test_every_model_is_in_a_group_and_every_line_is_there():
     assert group_names(MODELS) == ("paper", "frontier", "open")
     assert all(len(spec.groups) == 1 for spec in MODELS.values())
     assert {name for name, spec in MODELS.items() if spec.published} == set(of_group("paper"))
@@ -305,13 +299,13 @@ def test_every_model_is_in_a_group_and_every_line_is_there() -> None:
         assert {m for m in makers if not any(i.startswith(f"{m}/") for i in ids[group])} == set()
 
 
-def test_what_thinks_has_room_for_it() -> None:
+def test_what_thinks_has_room_for_it():
     for name, spec in of_group("frontier").items():
         thinks = map_entry(config(name, spec)).get("supports_reasoning")
         assert not thinks or (spec.max_tokens or 0) > 8192
 
 
-def test_each_is_asked_with_what_it_takes() -> None:
+def test_each_is_asked_with_what_it_takes():
     with contextlib.ExitStack() as stack:
         served = {n: stack.enter_context(Running(r.server())) for n, r in ROUTES.items()}
         for name, spec in of_group("frontier").items():
@@ -333,7 +327,7 @@ def test_each_is_asked_with_what_it_takes() -> None:
                 assert seen.params.get("temperature", 1.0) == 1.0, name
 
 
-def test_of_a_large_error_litellm_sees_the_beginning_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_of_a_large_error_litellm_sees_the_beginning_alone(monkeypatch):
     """It looks for keys in all that it sees, again and again."""
     sizes: list[int] = []
     after = LitellmClient._after

@@ -36,7 +36,7 @@ def answer(model: Model, key: str, seed: int = 0) -> Reply | None:
     return asyncio.run(model.ask(replace(make_request(key, seed), track="full_planning")))
 
 
-def test_a_reply_is_found_by_key_whatever_the_seed(tmp_path: Path) -> None:
+def test_a_reply_is_found_by_key_whatever_the_seed(tmp_path):
     (tmp_path / "007.json").write_text(json.dumps({"predict": STEPS}))
     model = replay(tmp_path)
     assert not model.needs_messages
@@ -54,15 +54,13 @@ def test_a_reply_is_found_by_key_whatever_the_seed(tmp_path: Path) -> None:
         (b'{"error": "overloaded"}', "not a recorded reply of a known shape"),
     ],
 )
-def test_a_broken_recording_is_an_error_at_its_place(
-    tmp_path: Path, content: bytes, said: str
-) -> None:
+def test_a_broken_recording_is_an_error_at_its_place(tmp_path, content, said):
     (tmp_path / "007.json").write_bytes(content)
     with pytest.raises(DataError, match=said):
         answer(replay(tmp_path), "007")
 
 
-def test_a_folder_that_is_missing_or_empty_is_an_error_at_the_start(tmp_path: Path) -> None:
+def test_a_folder_that_is_missing_or_empty_is_an_error_at_the_start(tmp_path):
     with pytest.raises(DataError, match="recordings not found"):
         replay(tmp_path / "nowhere")
     with pytest.raises(DataError, match="no recorded replies"):
@@ -82,7 +80,7 @@ def record(model: str, scene: str, seed: int, **fields: object) -> str:
     return json.dumps({**plan_record(), **named, **whole, **fields}) + "\n"
 
 
-def test_a_run_of_our_own_is_matched_by_model_key_and_seed(tmp_path: Path) -> None:
+def test_a_run_of_our_own_is_matched_by_model_key_and_seed(tmp_path):
     (tmp_path / "records.jsonl").write_text(
         record("m", "007", 1)
         + record("n", "007", 1, reply=Reply(text="other").model_dump())
@@ -111,9 +109,7 @@ def test_a_run_of_our_own_is_matched_by_model_key_and_seed(tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize(("kind", "error"), [("sample", SampleError), ("refused", RefusedError)])
-def test_a_recorded_error_is_raised_again(
-    tmp_path: Path, kind: str, error: type[SampleError]
-) -> None:
+def test_a_recorded_error_is_raised_again(tmp_path, kind, error):
     failed = {"kind": kind, "status": 400, "message": "no"}
     (tmp_path / "records.jsonl").write_text(record("m", "007", 1, reply=None, error=failed))
     with pytest.raises(error, match="no") as caught:
@@ -191,7 +187,7 @@ SHAPES: dict[str, tuple[object, Reply]] = {
 
 
 @pytest.mark.parametrize("name", SHAPES)
-def test_a_shape_is_read(name: str) -> None:
+def test_a_shape_is_read(name):
     raw, expected = SHAPES[name]
     assert read_raw_reply(raw, "000.json") == expected
 
@@ -203,7 +199,7 @@ OTHERS: tuple[Any, ...] = (
 
 
 @pytest.mark.parametrize("raw", OTHERS, ids=repr)
-def test_another_shape_is_an_error_that_names_the_file_and_its_keys(raw: Any) -> None:
+def test_another_shape_is_an_error_that_names_the_file_and_its_keys(raw):
     with pytest.raises(DataError) as caught:
         read_raw_reply(raw, "outputs/x/007.json")
     assert "outputs/x/007.json" in str(caught.value)
@@ -227,7 +223,7 @@ json_values = st.recursive(
 
 
 @given(json_values)
-def test_any_document_is_read_or_refused_with_a_data_error(raw: object) -> None:
+def test_any_document_is_read_or_refused_with_a_data_error(raw):
     """Values that are read can be written: texts as UTF-8, counts as numbers."""
     try:
         read = read_raw_reply(raw, "x.json")
@@ -260,7 +256,7 @@ def steps(name: str, request: Request) -> list[int]:
 
 
 @given(keys, seeds)
-def test_the_oracle_gives_a_valid_order_of_the_right_looks(key: str, seed: int) -> None:
+def test_the_oracle_gives_a_valid_order_of_the_right_looks(key, seed):
     given_steps = steps("oracle", make_request(key, seed))
     looks = [CANDIDATES[index].look for index in given_steps]
     order = [[block.look for block in SCENE.blocks].index(look) for look in looks]
@@ -268,7 +264,7 @@ def test_the_oracle_gives_a_valid_order_of_the_right_looks(key: str, seed: int) 
 
 
 @given(keys, seeds)
-def test_without_orientation_only_the_orientation_is_wrong(key: str, seed: int) -> None:
+def test_without_orientation_only_the_orientation_is_wrong(key, seed):
     given_steps = steps("oracle-no-orientation", make_request(key, seed))
     kinds = [CANDIDATES[index].kind for index in given_steps]
     order = [[block.kind for block in SCENE.blocks].index(kind) for kind in kinds]
@@ -280,7 +276,7 @@ def test_without_orientation_only_the_orientation_is_wrong(key: str, seed: int) 
 
 
 @pytest.mark.parametrize("name", PLANNERS)
-def test_what_is_drawn_depends_on_seed_and_key_alone(name: str) -> None:
+def test_what_is_drawn_depends_on_seed_and_key_alone(name):
     many = [make_request(f"{key:03}", seed) for key in range(10) for seed in range(5)]
     forwards = {(r.key, r.seed): said(name, r) for r in many}
     backwards = {(r.key, r.seed): said(name, r) for r in reversed(many)}
@@ -289,7 +285,7 @@ def test_what_is_drawn_depends_on_seed_and_key_alone(name: str) -> None:
         assert len({answer.text for answer in forwards.values()}) > 1
 
 
-def test_an_oracle_without_its_candidate_is_an_error() -> None:
+def test_an_oracle_without_its_candidate_is_an_error():
     poor = CandidateSet((Candidate("triangle", "orange", (0.0, 0.0, 0.0)),))
     with pytest.raises(DataError, match="no candidate looks like this block"):
         said("oracle", replace(make_request(), subject=PlanSubject(SCENE, poor)))

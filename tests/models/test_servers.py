@@ -72,7 +72,7 @@ def ask_through(
 
     async def main() -> None:
         policy = RetryPolicy(clock=time.clock, max_connection_failures=most_failures)
-        servers = Servers([Server("http://gone:1", client)], policy, told.append)  # type: ignore[arg-type]
+        servers = Servers([Server("http://gone:1", client)], policy, told.append)
         overall = asyncio.Semaphore(width)
         limits = Limits(width, overall, rest_s=servers.rest_s, clock=time.clock)
         config = ModelConfig(name="m", id="openai/m", api_base="http://gone:1/v1")
@@ -110,9 +110,7 @@ def ask_through(
     st.floats(0.1, 20, allow_nan=False),
     st.integers(1, 12),
 )
-def test_an_outage_loses_nothing_and_costs_few_attempts(
-    begins_s: float, lasts_s: float, takes_s: float, width: int
-) -> None:
+def test_an_outage_loses_nothing_and_costs_few_attempts(begins_s, lasts_s, takes_s, width):
     time = FakeTime()
     client = Outage(time, begins_s, begins_s + lasts_s, takes_s)
     # The outage may begin before the first answer: that is waited for here, too.
@@ -124,9 +122,7 @@ def test_an_outage_loses_nothing_and_costs_few_attempts(
 
 
 @pytest.mark.parametrize("width", [2, 8, 32])
-def test_a_wrong_address_stops_the_model_after_few_attempts_and_leaves_its_samples(
-    width: int,
-) -> None:
+def test_a_wrong_address_stops_the_model_after_few_attempts_and_leaves_its_samples(width):
     time = FakeTime()
     client = Outage(time, 0.0, float("inf"), 1.0)
     answers, told = ask_through(client, time, samples=500, width=width)
@@ -141,9 +137,7 @@ def test_a_wrong_address_stops_the_model_after_few_attempts_and_leaves_its_sampl
 
 @settings(max_examples=20, deadline=None)
 @given(st.floats(30, 60, allow_nan=False), st.integers(2, 12))
-def test_a_server_that_has_answered_is_tried_for_as_long_as_the_policy_says(
-    begins_s: float, width: int
-) -> None:
+def test_a_server_that_has_answered_is_tried_for_as_long_as_the_policy_says(begins_s, width):
     time = FakeTime()
     client = Outage(time, begins_s, float("inf"), 5.0)
     answers, _ = ask_through(client, time, samples=500, width=width)
@@ -154,7 +148,7 @@ def test_a_server_that_has_answered_is_tried_for_as_long_as_the_policy_says(
 
 
 def servers_of(count: int, policy: RetryPolicy | None = None) -> Servers:
-    made = [Server(f"http://replica:{n}", None) for n in range(count)]  # type: ignore[arg-type]
+    made = [Server(f"http://replica:{n}", None) for n in range(count)]
     return Servers(made, policy or RetryPolicy(), lambda _: None)
 
 
@@ -170,8 +164,8 @@ def break_off(servers: Servers, server: Server, error: ModelError = REFUSED) -> 
     st.data(),
 )
 def test_whoever_is_asked_is_there_and_has_no_more_to_do_than_any_other_that_is(
-    count: int, events: list[tuple[bool, int]], data: st.DataObject
-) -> None:
+    count, events, data
+):
     servers = servers_of(count, RetryPolicy(clock=FakeTime().clock))
     gone = data.draw(st.sets(st.integers(0, count - 1), max_size=count - 1))
     for number in gone:
@@ -191,7 +185,7 @@ def test_whoever_is_asked_is_there_and_has_no_more_to_do_than_any_other_that_is(
 
 
 @pytest.mark.parametrize("status", [429, 500, 529, 400, None])
-def test_what_a_server_says_itself_and_what_is_late_is_no_outage(status: int | None) -> None:
+def test_what_a_server_says_itself_and_what_is_late_is_no_outage(status):
     servers = servers_of(1)
     for number in range(50):
         error = RetryableError("x", status=status, sent="answered" if status else "maybe")
@@ -201,7 +195,7 @@ def test_what_a_server_says_itself_and_what_is_late_is_no_outage(status: int | N
 
 
 @given(st.none() | st.floats(0, 1000), st.integers(0, 20))
-def test_the_next_try_waits_as_long_as_the_server_asks(asked_s: float | None, tries: int) -> None:
+def test_the_next_try_waits_as_long_as_the_server_asks(asked_s, tries):
     time = FakeTime()
     policy = RetryPolicy(clock=time.clock, max_connection_failures=10**6)
     servers = servers_of(1, policy)
@@ -223,7 +217,7 @@ def test_the_next_try_waits_as_long_as_the_server_asks(asked_s: float | None, tr
 
 
 @given(st.sampled_from([429, 529]), st.floats(0.1, 200))
-def test_after_a_429_nobody_asks_before_the_server_wants(status: int, wait_s: float) -> None:
+def test_after_a_429_nobody_asks_before_the_server_wants(status, wait_s):
     time = FakeTime()
     servers = servers_of(2, RetryPolicy(clock=time.clock))
     error = RetryableError("slow down", status=status)
@@ -251,7 +245,7 @@ def names(count: int) -> list[str]:
 
 
 @pytest.mark.parametrize("route", ["direct", pytest.param("openai", marks=pytest.mark.slow)])
-def test_servers_that_die_in_the_middle_lose_nothing(route: str) -> None:
+def test_servers_that_die_in_the_middle_lose_nothing(route):
     servers = [OpenAIChat(Faults(latency_s=0.01), width=1) for _ in range(4)]
     told: list[str] = []
 
@@ -281,7 +275,7 @@ def test_servers_that_die_in_the_middle_lose_nothing(route: str) -> None:
     assert len(gone) == 3
 
 
-def test_a_server_that_refuses_everything_is_left_out_and_the_last_one_stops_the_model() -> None:
+def test_a_server_that_refuses_everything_is_left_out_and_the_last_one_stops_the_model():
     told: list[str] = []
     wrong, right = OpenAIChat(Faults(mode="404")), OpenAIChat()
     with Running(wrong) as first, Running(right) as second:

@@ -36,7 +36,6 @@ from phyblock.parsing.move import move_form
 from phyblock.parsing.plan import plan_form
 from phyblock.records.record import Reply
 from phyblock.run.plan import to_config
-from phyblock.types import ImageDetail
 from tests.models.factory import (
     JPEG,
     KEY,
@@ -105,7 +104,7 @@ def _no_proxy(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("route", ROUTES)
-def test_a_request_arrives_in_order_byte_for_byte_and_nothing_else(wire: Wire, route: str) -> None:
+def test_a_request_arrives_in_order_byte_for_byte_and_nothing_else(wire, route):
     pictures = (picture(1, PNG, 150_000), picture(2, JPEG, 90_000))
     request = make_request("017", 42, pictures=pictures)
     goal, candidates = (p for p in request.messages[1].parts if isinstance(p, Image))
@@ -132,9 +131,7 @@ def test_a_request_arrives_in_order_byte_for_byte_and_nothing_else(wire: Wire, r
         {"temperature": None, "top_p": None},
     ],
 )
-def test_both_transports_put_the_same_json_on_the_wire(
-    wire: Wire, extra: dict[str, object]
-) -> None:
+def test_both_transports_put_the_same_json_on_the_wire(wire, extra):
     request = make_request("017", 42, **extra)
     direct, through_litellm = (wire.arrived(route, request).raw for route in ("direct", "openai"))
     assert direct == through_litellm
@@ -143,7 +140,7 @@ def test_both_transports_put_the_same_json_on_the_wire(
 
 
 @pytest.mark.parametrize("route", ["direct", "openai"])
-def test_thoughts_left_in_the_text_become_reasoning(route: str) -> None:
+def test_thoughts_left_in_the_text_become_reasoning(route):
     class Thinker(OpenAIChat):
         def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
             content = "<think>\nred first\n</think>\n\nStep1: Move block with index 3"
@@ -181,8 +178,8 @@ def looked_at(seen: Seen) -> list[object]:
     ],
 )
 def test_how_closely_to_look_arrives_in_the_words_of_the_provider(
-    wire: Wire, route: str, model_id: str, detail: ImageDetail | None, arrives: object
-) -> None:
+    wire, route, model_id, detail, arrives
+):
     # litellm refuses the sampling parameters that models of today do not take.
     request = replace(make_request(), params={})
     seen = wire.arrived(route, request, id=model_id, image_detail=detail)
@@ -208,14 +205,12 @@ messages = st.builds(
     st.dictionaries(texts, texts, max_size=3),
     st.sampled_from([None, "low", "high"]),
 )
-def test_a_body_made_around_the_encoder_says_what_the_encoder_would(
-    content: tuple[Message, ...], fields: dict[str, str], detail: ImageDetail | None
-) -> None:
+def test_a_body_made_around_the_encoder_says_what_the_encoder_would(content, fields, detail):
     expected = {**fields, "messages": wire_messages(content, detail)}
     assert json.loads(json_body(fields, content, detail)) == expected
 
 
-def test_only_pictures_are_sent_as_pictures() -> None:
+def test_only_pictures_are_sent_as_pictures():
     request = make_request(pictures=(b"<html>", picture(1)))
     with pytest.raises(DataError, match=r"'goal'.*is not a picture"):
         wire_messages(request.messages, None)
@@ -225,7 +220,7 @@ def asking(form: Any) -> Request:
     return replace(make_request("017", 42), response_format=form.response_format)
 
 
-def test_the_schema_arrives_as_it_is_declared(wire: Wire) -> None:
+def test_the_schema_arrives_as_it_is_declared(wire):
     form = plan_form(16)
     seen = wire.arrived("direct", asking(form), response_format="always")
     schema = {"name": "plan", "schema": form.schema, "strict": True}
@@ -234,7 +229,7 @@ def test_the_schema_arrives_as_it_is_declared(wire: Wire) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("form", [plan_form(16), move_form(16), choice_form("abcd", True)])
-def test_litellm_hands_every_schema_on(wire: Wire, form: Any) -> None:
+def test_litellm_hands_every_schema_on(wire, form):
     def arrived(route: str) -> Seen:
         return wire.arrived(route, asking(form), response_format="always")
 
@@ -262,7 +257,7 @@ LOCAL = "http://localhost:8000/v1"
         ({"id": "dashscope/qwen-vl-max", "response_format": "always"}, True),
     ],
 )
-def test_who_is_sent_a_schema(fields: dict[str, str], sends: bool) -> None:
+def test_who_is_sent_a_schema(fields, sends):
     spec = ModelConfig.model_validate(fields)
     suite = Suite(name="s", models=("m",))
     in_json = Suite(name="s", models=("m",), answer_format="json_schema")
@@ -282,10 +277,8 @@ def test_who_is_sent_a_schema(fields: dict[str, str], sends: bool) -> None:
         ("openai/m", LOCAL, "litellm", False),
     ],
 )
-def test_the_transport_is_chosen_by_rule(
-    model_id: str, api_base: str | None, transport: Any, is_direct: bool
-) -> None:
-    config = ModelConfig(name="m", id=model_id, api_base=api_base, transport=transport)  # type: ignore[call-arg]
+def test_the_transport_is_chosen_by_rule(model_id, api_base, transport, is_direct):
+    config = ModelConfig(name="m", id=model_id, api_base=api_base, transport=transport)
     assert config.is_direct == is_direct
 
 
@@ -311,7 +304,7 @@ def seeded(*seeds: int) -> list[Request]:
 
 
 @pytest.mark.parametrize(("route", "mode"), CELLS)
-def test_a_call_ends_as_the_server_ends_it(wire: Wire, route: str, mode: str) -> None:
+def test_a_call_ends_as_the_server_ends_it(wire, route, mode):
     kind, requests, _ = ENDS[mode]
     asked = seeded(1) if kind is RetryableError else seeded(1, 2, 3)
     answers, server, events = wire.ask(route, *asked, faults=Faults(mode=mode), seed="never")
@@ -333,7 +326,7 @@ def test_a_call_ends_as_the_server_ends_it(wire: Wire, route: str, mode: str) ->
 
 @pytest.mark.parametrize("route", ROUTES)
 @pytest.mark.parametrize("wish", ["7", "Wed, 21 Oct 2099 07:28:00 GMT"])
-def test_retry_after_is_read_as_seconds_and_as_a_date(wire: Wire, route: str, wish: str) -> None:
+def test_retry_after_is_read_as_seconds_and_as_a_date(wire, route, wish):
     faults = Faults(mode="429", retry_after=wish)
     (answer,), _, _ = wire.ask(route, *seeded(1), faults=faults, policy=ONCE)
     assert isinstance(answer, RetryableError)
@@ -341,7 +334,7 @@ def test_retry_after_is_read_as_seconds_and_as_a_date(wire: Wire, route: str, wi
 
 
 @pytest.mark.parametrize("route", [*OPENAI, "gemini"])
-def test_a_refused_seed_is_an_error_that_says_what_to_set(wire: Wire, route: str) -> None:
+def test_a_refused_seed_is_an_error_that_says_what_to_set(wire, route):
     (answer,), _, _ = wire.ask(route, *seeded(1), faults=Faults(mode="seed"))
     assert isinstance(answer, SampleError)
     assert "set seed: never" in str(answer)
@@ -349,7 +342,7 @@ def test_a_refused_seed_is_an_error_that_says_what_to_set(wire: Wire, route: str
     assert (answer.seed_sent, answer.attempts) == (False, 1)
 
 
-def test_where_no_seed_exists_none_is_sent_unless_it_must_be(wire: Wire) -> None:
+def test_where_no_seed_exists_none_is_sent_unless_it_must_be(wire):
     answers, server, _ = wire.ask("anthropic", *seeded(1, 2))
     assert [answer.seed_sent for answer in answers] == [False, False]
     (answer,), server, _ = wire.ask("anthropic", *seeded(1), seed="always")
@@ -358,7 +351,7 @@ def test_where_no_seed_exists_none_is_sent_unless_it_must_be(wire: Wire) -> None
 
 
 @pytest.mark.parametrize("route", ROUTES)
-def test_a_server_that_never_answers_is_a_timeout(wire: Wire, route: str) -> None:
+def test_a_server_that_never_answers_is_a_timeout(wire, route):
     policy, faults = replace(QUICK, attempts=2), Faults(mode="slow")
     (answer,), server, _ = wire.ask(route, *seeded(1), faults=faults, policy=policy, timeout_s=0.3)
     assert isinstance(answer, RetryableError)
@@ -366,7 +359,7 @@ def test_a_server_that_never_answers_is_a_timeout(wire: Wire, route: str) -> Non
     assert server.requests == policy.attempts
 
 
-def test_keys_leave_an_error_before_it_is_cut() -> None:
+def test_keys_leave_an_error_before_it_is_cut():
     for length in range(440, 520):
         text = shown(f"{'x' * length}{KEY} and more", (KEY,))
         assert len(text) <= 500
@@ -434,7 +427,7 @@ def answers_to(route: Route, server: LocalServer, url: str, faults: list[str]) -
 
 
 @pytest.mark.parametrize("name", ROUTES)
-def test_every_fault_ends_as_it_must_after_one_request(wire: Wire, name: str) -> None:
+def test_every_fault_ends_as_it_must_after_one_request(wire, name):
     server, url = wire.at(name)
     answers = answers_to(ROUTES[name], server, url, list(WIRE_FAULTS))
     for mode, answer in answers.items():
@@ -461,7 +454,7 @@ def test_every_fault_ends_as_it_must_after_one_request(wire: Wire, name: str) ->
 
 
 @pytest.mark.parametrize("name", REDIRECTED)
-def test_a_redirect_takes_nothing_anywhere(name: str) -> None:
+def test_a_redirect_takes_nothing_anywhere(name):
     route = REDIRECTED[name]
     away = OpenAIChat()
     with Running(away) as elsewhere:
@@ -480,7 +473,7 @@ def test_a_redirect_takes_nothing_anywhere(name: str) -> None:
             assert f"redirects to localhost:{elsewhere.port}," in str(answer)
 
 
-def test_both_transports_say_the_same_of_what_a_server_said(wire: Wire) -> None:
+def test_both_transports_say_the_same_of_what_a_server_said(wire):
     modes = ["200-quota", "200-code-object", "200-error-string", "400-string", "401-string"]
     modes += ["429-bare", "503", "redirect-nowhere", "gzip-bomb", "reset-midway"]
     told = []
@@ -501,14 +494,14 @@ def unreachable(name: str, url: str, **fields: Any) -> str:
 
 
 @pytest.mark.parametrize("name", ["direct", "openai", "vllm", "anthropic"])
-def test_a_name_that_is_not_known_is_not_called_a_lost_connection(name: str) -> None:
+def test_a_name_that_is_not_known_is_not_called_a_lost_connection(name):
     said = unreachable(name, "http://no-such-host.invalid")
     assert "DNS" in said
     assert "no-such-host.invalid" in said
 
 
 @pytest.mark.parametrize("name", ["direct", "vllm"])
-def test_a_closed_port_and_a_server_without_tls_are_named(wire: Wire, name: str) -> None:
+def test_a_closed_port_and_a_server_without_tls_are_named(wire, name):
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         closed = f"http://127.0.0.1:{taken.getsockname()[1]}"
@@ -516,7 +509,7 @@ def test_a_closed_port_and_a_server_without_tls_are_named(wire: Wire, name: str)
             assert f"no connection to {url.partition('//')[2]}" in unreachable(name, url)
 
 
-def test_a_connection_that_is_not_made_in_time_was_not_sent() -> None:
+def test_a_connection_that_is_not_made_in_time_was_not_sent():
     with socket.socket() as full, contextlib.ExitStack() as stack:
         full.bind(("127.0.0.1", 0))
         full.listen(0)

@@ -100,7 +100,7 @@ READ: dict[str, list[str]] = {
 @pytest.mark.parametrize(
     ("text", "said"), [(text, said) for said, texts in READ.items() for text in texts]
 )
-def test_a_plan_is_read_in_whatever_decoration(text: str, said: str) -> None:
+def test_a_plan_is_read_in_whatever_decoration(text, said):
     parsed = parse_plan(text, N)
     assert (" ".join(map(str, parsed.plan.steps)), parsed.truncated) == (said, False)
     assert parsed.rule in ("json", "steps", "list", "numbers")
@@ -122,7 +122,7 @@ def test_a_plan_is_read_in_whatever_decoration(text: str, said: str) -> None:
         (f"Step1: block {'9' * 5000}", "no_plan"),
     ],
 )
-def test_a_reply_without_a_plan_is_a_named_problem(text: str, problem: str) -> None:
+def test_a_reply_without_a_plan_is_a_named_problem(text, problem):
     parsed = parse_plan(text, N)
     assert (parsed.plan.steps, parsed.rule, parsed.problem) == ((), None, problem)
 
@@ -147,9 +147,7 @@ CUT = (
         ("Step1: Move block with index 7\nStep2: Move block with index 1", (7, 1), False),
     ],
 )
-def test_a_plan_that_the_text_breaks_off_in_is_read_as_far_as_it_goes(
-    text: str, said: tuple[int, ...], truncated: bool
-) -> None:
+def test_a_plan_that_the_text_breaks_off_in_is_read_as_far_as_it_goes(text, said, truncated):
     parsed = parse_plan(text, N)
     assert (parsed.plan.steps, parsed.truncated) == (said, truncated)
 
@@ -173,12 +171,12 @@ HARMLESS = [
 
 
 @pytest.mark.parametrize("text", HARMLESS)
-def test_what_stands_around_a_plan_changes_nothing(text: str) -> None:
+def test_what_stands_around_a_plan_changes_nothing(text):
     for whole in (f"{TEXT}\n\n{text}", f"{text}\n\n{TEXT}", f"{text}\n\n{TEXT}\n\n{text}"):
         assert parse_plan(whole, N).plan.steps == PLAN
 
 
-def test_the_official_rule_reads_every_mention_and_nothing_else() -> None:
+def test_the_official_rule_reads_every_mention_and_nothing_else():
     text = f"I take block with index 4, not block 5.\n{TEXT}\nblock with index 99"
     parsed = parse_plan(text, N, "official")
     assert (parsed.plan.steps, parsed.dropped) == ((4, *PLAN), (99,))
@@ -195,9 +193,7 @@ prose = st.lists(
 
 
 @given(numbers, prose, prose)
-def test_text_without_numbers_around_the_asked_form_never_changes_it(
-    steps: list[int], before: str, behind: str
-) -> None:
+def test_text_without_numbers_around_the_asked_form_never_changes_it(steps, before, behind):
     assert parse_plan(f"{before}\n\n{asked(*steps)}\n\n{behind}", N).plan.steps == tuple(steps)
 
 
@@ -222,24 +218,20 @@ DRESSES = (
     st.sampled_from(("\n", "\n\n", "  \n", "\r\n")),
     st.booleans(),
 )
-def test_decoration_and_fences_change_nothing(
-    steps: list[int], dress: str, between: str, is_fenced: bool
-) -> None:
+def test_decoration_and_fences_change_nothing(steps, dress, between, is_fenced):
     lines = between.join(dress.format(line) for line in asked(*steps).split("\n"))
     text = f"```json\n{{\n{lines}\n}}\n```" if is_fenced else lines
     assert parse_plan(text, N).plan.steps == tuple(steps)
 
 
 @given(numbers, st.permutations(range(1, N + 1)))
-def test_numbering_candidates_otherwise_numbers_the_plan_otherwise(
-    steps: list[int], order: list[int]
-) -> None:
+def test_numbering_candidates_otherwise_numbers_the_plan_otherwise(steps, order):
     for write in (asked, lambda *plan: json.dumps({"reasoning": "", "plan": plan})):
         moved = [order[step - 1] for step in steps]
         assert parse_plan(write(*moved), N).plan.steps == tuple(moved)
 
 
-def test_every_recorded_reply_is_read_as_counted(official_checkout: Path) -> None:
+def test_every_recorded_reply_is_read_as_counted(official_checkout):
     found: dict[str, Counter[str]] = {}
     for (model, _), text in reply_texts(official_checkout).items():
         parsed = parse_plan(text, 16)

@@ -59,16 +59,14 @@ REPLIES: list[tuple[str, str]] = [
 
 
 @pytest.mark.parametrize(("text", "said"), REPLIES)
-def test_an_operation_is_read_as_it_is_said(text: str, said: str) -> None:
+def test_an_operation_is_read_as_it_is_said(text, said):
     parsed = parse_move(text)
     read = "done" if parsed.is_done else parsed.move
     assert (parsed.problem or f"{read} {parsed.rule}") == said
 
 
 @given(st.integers(1, 16), st.text(st.sampled_from("abc ,.\n"), max_size=80), st.booleans())
-def test_what_stands_before_the_asked_form_changes_nothing(
-    number: int, text: str, is_json: bool
-) -> None:
+def test_what_stands_before_the_asked_form_changes_nothing(number, text, is_json):
     asked = (
         json.dumps({"reasoning": text, "operation": f"Move({number})"})
         if is_json
@@ -116,7 +114,7 @@ READ: list[tuple[str, str | None, str | None]] = [
 
 
 @pytest.mark.parametrize(("text", "letter", "rule"), READ)
-def test_a_choice_is_read_as_it_is_stated(text: str, letter: str | None, rule: str | None) -> None:
+def test_a_choice_is_read_as_it_is_stated(text, letter, rule):
     parsed = parse_answer(text, TEXTS, is_ordering=False)
     assert (parsed.letters, parsed.rule) == (letter, rule)
     assert (parsed.problem is None) == (letter is not None)
@@ -129,7 +127,7 @@ def test_a_choice_is_read_as_it_is_stated(text: str, letter: str | None, rule: s
         *(("Answer: 75", None), ("It is 5 cm or 10 cm long.", None)),
     ],
 )
-def test_options_that_are_numbers_are_read_by_number(text: str, letter: str | None) -> None:
+def test_options_that_are_numbers_are_read_by_number(text, letter):
     assert parse_answer(text, LENGTHS, is_ordering=False).letters == letter
 
 
@@ -152,7 +150,7 @@ def test_options_that_are_numbers_are_read_by_number(text: str, letter: str | No
         ("I cannot tell.", None),
     ],
 )
-def test_an_order_is_the_last_that_names_every_letter(text: str, letters: str | None) -> None:
+def test_an_order_is_the_last_that_names_every_letter(text, letters):
     assert parse_answer(text, TEXTS, is_ordering=True).letters == letters
 
 
@@ -164,13 +162,13 @@ harmless = st.text(st.sampled_from("xyz ,.\n"), max_size=80)
     st.sampled_from("ABCD"),
     st.sampled_from(("Answer: {}", "**Answer: {}**", "\\boxed{{{}}}")),
 )
-def test_text_before_the_asked_line_changes_nothing(text: str, letter: str, form: str) -> None:
+def test_text_before_the_asked_line_changes_nothing(text, letter, form):
     whole = f"{text}\n{form.format(letter)}"
     assert parse_answer(whole, TEXTS, is_ordering=False).letters == letter
 
 
 @given(st.permutations("ABCD"))
-def test_the_json_form_is_read_as_it_is_written(order: list[str]) -> None:
+def test_the_json_form_is_read_as_it_is_written(order):
     for value, is_ordering in ((order, True), (order[0], False)):
         form = choice_form(TEXTS, is_ordering)
         text = json.dumps({"reasoning": "It is {A}.", form.key: value})
@@ -212,7 +210,7 @@ PLANS_READ = [
 
 
 @pytest.mark.parametrize("text", PLANS_READ)
-def test_a_plan_is_read_in_whatever_decoration(text: str) -> None:
+def test_a_plan_is_read_in_whatever_decoration(text):
     parsed = parse_poses(text, 16)
     assert parsed.problem is None
     assert [(step.candidate, pytest.approx(step.center_cm)) for step in parsed.steps] == STEPS
@@ -251,7 +249,7 @@ def one(rest: str) -> str:
         ("\n".join(f"Step{i}: block 3 at (1, 1, {i})" for i in range(1, 102)), "too_many_steps"),
     ],
 )
-def test_a_step_that_cannot_be_read_is_the_problem_of_the_plan(text: str, problem: str) -> None:
+def test_a_step_that_cannot_be_read_is_the_problem_of_the_plan(text, problem):
     parsed = parse_poses(text, 16)
     assert (parsed.steps, parsed.rule, parsed.problem) == ((), None, problem)
 
@@ -261,9 +259,7 @@ steps = st.builds(PoseStep, st.integers(1, 16), st.tuples(lengths, lengths, leng
 
 
 @given(st.lists(steps, min_size=1, max_size=MOST_POSE_STEPS), st.booleans())
-def test_every_plan_of_the_asked_forms_is_read_as_it_is_written(
-    plan: list[PoseStep], is_json: bool
-) -> None:
+def test_every_plan_of_the_asked_forms_is_read_as_it_is_written(plan, is_json):
     lines = [f"Step{i}: block {one.candidate} at {one.center_cm}" for i, one in enumerate(plan, 1)]
     items = [
         {"block": one.candidate, **dict(zip("xyz", one.center_cm, strict=True))} for one in plan
@@ -312,7 +308,7 @@ def check(read: Callable[[str], object], piece: str) -> None:
 
 
 @pytest.mark.parametrize("name", READERS)
-def test_a_text_of_one_piece_is_read_in_linear_time(name: str) -> None:
+def test_a_text_of_one_piece_is_read_in_linear_time(name):
     for piece in PIECES:
         check(READERS[name], piece)
 
@@ -321,13 +317,13 @@ def test_a_text_of_one_piece_is_read_in_linear_time(name: str) -> None:
 @settings(max_examples=10, deadline=None)
 @given(st.lists(st.sampled_from(PIECES), min_size=2, max_size=8).map("".join))
 @example("Step1: Move block with index 16  \n")
-def test_a_text_of_many_pieces_is_read_in_linear_time(name: str, piece: str) -> None:
+def test_a_text_of_many_pieces_is_read_in_linear_time(name, piece):
     check(READERS[name], piece)
 
 
 @pytest.mark.parametrize("name", READERS)
 @given(st.text())
-def test_any_text_is_read_or_a_named_problem(name: str, text: str) -> None:
+def test_any_text_is_read_or_a_named_problem(name, text):
     parsed = READERS[name](text)
     assert (parsed.rule is None) == (parsed.problem is not None)
     if name == "move":

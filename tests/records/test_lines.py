@@ -6,7 +6,6 @@ import contextlib
 import json
 import os
 import re
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +20,7 @@ from phyblock.data.scenes import StoredScene
 from phyblock.errors import DataError, StoreError
 from phyblock.records import files
 from phyblock.records.files import RecordLines, known_records, newest_starts
-from phyblock.records.record import Line, Reply, Usage, validated
+from phyblock.records.record import Reply, Usage, validated
 from phyblock.results.load import load_run
 from tests.data.broken import Raw, sound_scene, with_value
 from tests.documents import ROOT
@@ -38,7 +37,7 @@ def lines_of(path: Path) -> list[str]:
     return (DATA / path).read_text(encoding="utf-8").splitlines()
 
 
-def test_shipped_scenes_and_questions_are_written_byte_for_byte() -> None:
+def test_shipped_scenes_and_questions_are_written_byte_for_byte():
     written = [StoredScene.of(task.scene, task.candidates).as_json() for task in TASKS]
     assert written == lines_of(SCENES)
     originals = {task.key: task.scene for task in TASKS}
@@ -50,7 +49,7 @@ def test_shipped_scenes_and_questions_are_written_byte_for_byte() -> None:
 @pytest.mark.parametrize(
     ("kind", "raw"), [(StoredScene, sound_scene()), (StoredQuestion, sound_question())]
 )
-def test_a_line_may_say_its_version_and_none_is_from_the_future(kind: type[Line], raw: Raw) -> None:
+def test_a_line_may_say_its_version_and_none_is_from_the_future(kind, raw):
     for line in (raw, {**raw, "format": 1}):
         assert json.loads(validated(kind, line, "here").as_json()) == line
     with pytest.raises(DataError) as caught:
@@ -74,7 +73,7 @@ def schema(name: str) -> jsonschema.Draft202012Validator:
     ],
     ids=["scene", "question", "record"],
 )
-def test_the_schemas_take_what_is_shipped(name: str, lines: list[str]) -> None:
+def test_the_schemas_take_what_is_shipped(name, lines):
     found = schema(name)
     for line in lines:
         found.validate(json.loads(line))
@@ -96,9 +95,7 @@ BROKEN: dict[str, tuple[str, Raw, str, Any]] = {
 
 
 @pytest.mark.parametrize(("name", "raw", "at", "value"), BROKEN.values(), ids=BROKEN)
-def test_the_schemas_refuse_what_the_models_refuse(
-    name: str, raw: Raw, at: str, value: object
-) -> None:
+def test_the_schemas_refuse_what_the_models_refuse(name, raw, at, value):
     broken = with_value(raw, at, value)
     assert schema(name).is_valid(raw)
     assert not schema(name).is_valid(broken)
@@ -124,7 +121,7 @@ def whole(line: bytes) -> bytes:
 
 
 @pytest.mark.parametrize("line", lines_before(), ids=["plan", "episode", "choice"])
-def test_lines_of_the_first_version_are_written_again_byte_for_byte(line: bytes) -> None:
+def test_lines_of_the_first_version_are_written_again_byte_for_byte(line):
     assert whole(line) == line
 
 
@@ -136,14 +133,14 @@ json_values = st.recursive(
 
 
 @given(st.dictionaries(st.text("xyz", min_size=1, max_size=3), json_values, max_size=3))
-def test_what_no_model_declares_is_kept(more: dict[str, object]) -> None:
+def test_what_no_model_declares_is_kept(more):
     record = plan_record()
     line = json.dumps(record | more, ensure_ascii=False, separators=(",", ":")).encode()
     assert whole(line) == line
 
 
 @pytest.mark.parametrize("name", DAMAGED)
-def test_a_damaged_line_is_named_with_its_field(tmp_path: Path, name: str) -> None:
+def test_a_damaged_line_is_named_with_its_field(tmp_path, name):
     line, field, says = DAMAGED[name]
     sound = lines_before()[0]
     with pytest.raises(StoreError) as caught:
@@ -157,9 +154,7 @@ def test_a_damaged_line_is_named_with_its_field(tmp_path: Path, name: str) -> No
 
 
 @given(st.binary(max_size=40), st.integers(0, 2469), st.integers(0, 40))
-def test_any_bytes_are_read_or_refused(
-    tmp_path_factory: pytest.TempPathFactory, noise: bytes, start: int, length: int
-) -> None:
+def test_any_bytes_are_read_or_refused(tmp_path_factory, noise, start, length):
     sound = lines_before()[0]
     damaged = sound[:start] + noise.replace(b"\n", b" ") + sound[start + length :]
     folder = folder_with(tmp_path_factory.mktemp("run"), damaged, sound)
@@ -171,7 +166,7 @@ def test_any_bytes_are_read_or_refused(
 
 
 @pytest.mark.parametrize("name", ["deep", "many-digits", "word", "nan"])
-def test_only_what_a_kill_cut_short_is_passed_over(tmp_path: Path, name: str) -> None:
+def test_only_what_a_kill_cut_short_is_passed_over(tmp_path, name):
     folder = folder_with(tmp_path, lines_before()[0])
     with (folder / "records.jsonl").open("ab") as file:
         file.write(DAMAGED[name][0])
@@ -179,9 +174,7 @@ def test_only_what_a_kill_cut_short_is_passed_over(tmp_path: Path, name: str) ->
         list(RecordLines(folder))
 
 
-def test_a_line_without_end_is_refused_and_not_taken_for_a_cut_one(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_line_without_end_is_refused_and_not_taken_for_a_cut_one(tmp_path, monkeypatch):
     monkeypatch.setattr(files, "_LONGEST_LINE_BYTES", 3000)
     folder = folder_with(tmp_path, lines_before()[0], b'"' + b"x" * 5000, lines_before()[0])
     found = RecordLines(folder)
@@ -191,13 +184,13 @@ def test_a_line_without_end_is_refused_and_not_taken_for_a_cut_one(
 
 
 @pytest.mark.parametrize("make", [os.mkfifo, Path.mkdir])
-def test_what_is_no_file_is_refused(tmp_path: Path, make: Callable[[Path], None]) -> None:
+def test_what_is_no_file_is_refused(tmp_path, make):
     make(tmp_path / "records.jsonl")
     with pytest.raises(StoreError, match=r"is not a regular file|Is a directory"):
         list(RecordLines(tmp_path))
 
 
-def test_a_sample_is_taken_from_its_last_line(tmp_path: Path) -> None:
+def test_a_sample_is_taken_from_its_last_line(tmp_path):
     first, last = lines_before()[0], record_with("reply.text", "later")
     records = RecordLines(folder_with(tmp_path, first, last))
     starts = newest_starts(records)
@@ -210,9 +203,7 @@ def test_a_sample_is_taken_from_its_last_line(tmp_path: Path) -> None:
 @given(
     st.text(st.characters(exclude_categories=()), max_size=9), numbers, numbers, amounts, amounts
 )
-def test_whatever_was_paid_for_is_stored_and_read(
-    text: str, sent: int | None, said: int | None, cost: float | None, billed: float | None
-) -> None:
+def test_whatever_was_paid_for_is_stored_and_read(text, sent, said, cost, billed):
     usage = Usage().model_copy(update={"prompt_tokens": sent, "completion_tokens": said})
     paid = {"text": text, "usage": usage, "cost_usd": cost, "billed_usd": billed}
     kept = Reply(text="").model_copy(update=paid).storable()
@@ -225,5 +216,5 @@ def test_whatever_was_paid_for_is_stored_and_read(
 
 
 @pytest.mark.parametrize("name", ["huge-number", "number-for-text", "word", "score", "track"])
-def test_the_schema_refuses_damaged_records(name: str) -> None:
+def test_the_schema_refuses_damaged_records(name):
     assert not schema("record").is_valid(json.loads(DAMAGED[name][0]))

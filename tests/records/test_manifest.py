@@ -23,7 +23,7 @@ IDENTITY = "5eed" * 16
 
 @pytest.mark.parametrize("name", YAML_TEXTS)
 @pytest.mark.parametrize("field", ["mine", "scenes_by_level"])
-def test_what_no_run_writes_is_refused_in_words(tmp_path: Path, name: str, field: str) -> None:
+def test_what_no_run_writes_is_refused_in_words(tmp_path, name, field):
     (tmp_path / MANIFEST).write_text(f"identity: x\n{field}: {YAML_TEXTS[name]}\n")
     with pytest.raises(StoreError, match=r"run\.yaml"):
         read_manifest(tmp_path)
@@ -50,7 +50,7 @@ def renamed(**changes: Any) -> Raw:
     return {**record, "sample": "/".join(parts)}
 
 
-def test_a_run_takes_its_own_records() -> None:
+def test_a_run_takes_its_own_records():
     plain, signed = plan_record(), {**plan_record(), "run": IDENTITY[:16]}
     for record in (plain, signed):
         assert differs(Validation(facts(identity=IDENTITY), {plain["sample"]}), record) is None
@@ -68,11 +68,11 @@ def test_a_run_takes_its_own_records() -> None:
         ({**plan_record(), "model": "oracle"}, "sample"),
     ],
 )
-def test_a_foreign_record_is_known_by_what_differs(record: Raw, field: str) -> None:
+def test_a_foreign_record_is_known_by_what_differs(record, field):
     assert differs(Validation(facts(), {plan_record()["sample"]}), record) == field
 
 
-def test_a_call_of_another_run_is_foreign() -> None:
+def test_a_call_of_another_run_is_foreign():
     manifest = facts()
     call = Call(call=0, model="m", sample="s", key="k", run=manifest.run)
     assert Validation(manifest, {"t"}).problem("calls.jsonl:1", call) is None
@@ -99,9 +99,7 @@ READERS: dict[str, Callable[[Path], object]] = {"load": load_run, "score": resco
 
 
 @pytest.mark.parametrize("reader", READERS)
-def test_records_that_were_copied_in_are_not_counted(
-    runs: Workspace, tmp_path: Path, reader: str
-) -> None:
+def test_records_that_were_copied_in_are_not_counted(runs, tmp_path, reader):
     folder = shutil.copytree(runs.out, tmp_path / "run")
     READERS[reader](folder)
     path = folder / "records.jsonl"
@@ -115,9 +113,7 @@ def test_records_that_were_copied_in_are_not_counted(
     assert path.read_bytes() == before
 
 
-def test_a_run_does_not_go_on_with_records_that_were_copied_in(
-    runs: Workspace, tmp_path: Path
-) -> None:
+def test_a_run_does_not_go_on_with_records_that_were_copied_in(runs, tmp_path):
     whole = runs.out
     runs.out = Path(shutil.copytree(whole, tmp_path / "run"))
     try:

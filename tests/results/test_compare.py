@@ -44,7 +44,7 @@ def one_seed(*records: dict[str, Any], **facts: Any) -> Run:
 
 @laws
 @given(record_lists())
-def test_turning_a_pair_round_turns_all_that_it_says_round(records: Records) -> None:
+def test_turning_a_pair_round_turns_all_that_it_says_round(records):
     run = run_of(records, manifest())
     one, other = (
         compare_models(run, names).table for names in (["alpha", "beta"], ["beta", "alpha"])
@@ -58,7 +58,7 @@ def test_turning_a_pair_round_turns_all_that_it_says_round(records: Records) -> 
     assert not (bounded.abs() > 100).any(axis=None)
 
 
-def test_only_samples_that_both_have_are_compared() -> None:
+def test_only_samples_that_both_have_are_compared():
     run = one_seed(
         *plans("alpha", {"000": 4, "001": 2, "002": 0}),
         *plans("beta", {"001": 4, "002": 0, "003": 4}),
@@ -70,7 +70,7 @@ def test_only_samples_that_both_have_are_compared() -> None:
     assert (row["better"], row["worse"], row["same"]) == (0, 1, 1)
 
 
-def test_a_model_without_any_reply_is_not_compared_though_empty_plans_count() -> None:
+def test_a_model_without_any_reply_is_not_compared_though_empty_plans_count():
     silent = [
         record("beta", scene, outcome="api_error", scores=[score(0, 0, 4)]) for scene in LEVELS
     ]
@@ -82,7 +82,7 @@ def test_a_model_without_any_reply_is_not_compared_though_empty_plans_count() ->
     assert (row["n_samples"], row["better"], row["same"]) == (5, 4, 1)
 
 
-def test_what_cannot_be_told_is_said() -> None:
+def test_what_cannot_be_told_is_said():
     for n, verdict in ((12, "cannot tell"), (4, "too few base scenes to tell")):
         right = {f"{scene:03}": 1 + scene % 3 for scene in range(n)}
         other = {scene: 4 - tp for scene, tp in right.items()}
@@ -101,7 +101,7 @@ def test_what_cannot_be_told_is_said() -> None:
     assert verdicts["3"] == "nothing to compare"
 
 
-def test_a_gap_is_found_among_many_models_and_ranks_say_what_is_sure() -> None:
+def test_a_gap_is_found_among_many_models_and_ranks_say_what_is_sure():
     scenes = [f"{n:03}" for n in range(60)]
     draw = np.random.default_rng(7)
     strength = {"best": 0.75, **{f"model-{n:02}": 0.5 for n in range(25)}}
@@ -128,7 +128,7 @@ def test_a_gap_is_found_among_many_models_and_ranks_say_what_is_sure() -> None:
     assert (found.table["detectable"] < found.table["detectable_holm"]).all()
 
 
-def test_two_runs_are_compared_by_the_models_they_share_or_by_two_named() -> None:
+def test_two_runs_are_compared_by_the_models_they_share_or_by_two_named():
     first = one_seed(*plans("alpha", {"000": 4, "001": 2}), models=["alpha"])
     second = run_of(
         [*plans("alpha", {"000": 1, "001": 1}), *plans("beta", {"000": 4, "001": 4})],
@@ -160,13 +160,13 @@ def other_track() -> Run:
         (other_track(), "no such track to compare"),
     ],
 )
-def test_runs_that_cannot_be_compared_are_refused(other: Run, said: str) -> None:
+def test_runs_that_cannot_be_compared_are_refused(other, said):
     first = one_seed(*plans("alpha", {"000": 4}), models=["alpha"])
     with pytest.raises(SpecError, match=said):
         compare_runs(first, other)
 
 
-def test_what_a_run_lacks_is_named() -> None:
+def test_what_a_run_lacks_is_named():
     run = one_seed(*plans("alpha", {"000": 4}), models=["alpha"])
     with pytest.raises(SpecError, match=r"found: vqa(?s:.*)allowed: full_planning"):
         compare_models(run_of([], manifest()), track="vqa")
@@ -174,7 +174,7 @@ def test_what_a_run_lacks_is_named() -> None:
         compare_models(run)
 
 
-def test_the_first_runs_policy_on_missing_replies_holds_for_both() -> None:
+def test_the_first_runs_policy_on_missing_replies_holds_for_both():
     def of(missing: str, failed: str) -> Run:
         lost = record("alpha", failed, outcome="missing", scores=[score(0, 0, 4)])
         right = {scene: 4 for scene in ("000", "001", "002") if scene != failed}
@@ -211,7 +211,7 @@ def varied(models: dict[str, int]) -> Run:
     return run_of(records, told)
 
 
-def test_the_figure_and_the_table_show_the_same_components() -> None:
+def test_the_figure_and_the_table_show_the_same_components():
     run = varied(ASKED)
     table = sensitivity_frame(run).set_index(["factor", "model"])
     figure = sensitivity(run, track="full_planning")
@@ -229,7 +229,7 @@ def test_the_figure_and_the_table_show_the_same_components() -> None:
             assert (row[2], row[4]) == (number(wanted["shift"]), number(wanted["single"]))
 
 
-def test_a_model_that_was_barely_asked_changes_nothing_of_others() -> None:
+def test_a_model_that_was_barely_asked_changes_nothing_of_others():
     run, alone = varied({**ASKED, "barely": 2}), varied(ASKED)
     table = sensitivity_frame(run)
     pd.testing.assert_frame_equal(table[table["model"] != "barely"], sensitivity_frame(alone))

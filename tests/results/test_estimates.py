@@ -7,7 +7,6 @@ import math
 import subprocess
 import sys
 from collections.abc import Iterable
-from random import Random
 from typing import Any
 
 import numpy as np
@@ -26,9 +25,7 @@ from tests.web.factory import LEVELS, laws, manifest, record, record_lists, run_
 
 @laws
 @given(record_lists(), st.randoms())
-def test_the_order_of_records_changes_nothing(
-    records: list[dict[str, object]], random: Random
-) -> None:
+def test_the_order_of_records_changes_nothing(records, random):
     shuffled = records.copy()
     random.shuffle(shuffled)
     left, right = (run_of(one, manifest()) for one in (records, shuffled))
@@ -38,16 +35,14 @@ def test_the_order_of_records_changes_nothing(
 
 @laws
 @given(record_lists())
-def test_columns_and_types_do_not_depend_on_the_records(records: list[dict[str, object]]) -> None:
+def test_columns_and_types_do_not_depend_on_the_records(records):
     some, none = (run_of(one, manifest()) for one in (records, []))
     assert some.records.dtypes.to_dict() == none.records.dtypes.to_dict()
 
 
 @laws
 @given(st.data())
-def test_a_cut_last_line_is_passed_over_and_counted(
-    tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
-) -> None:
+def test_a_cut_last_line_is_passed_over_and_counted(tmp_path_factory, data):
     folder = write_run(tmp_path_factory.mktemp("runs") / "run", [record()], manifest())
     line = json.dumps(record("beta"))
     kept = data.draw(st.integers(1, len(line) - 1))
@@ -58,7 +53,7 @@ def test_a_cut_last_line_is_passed_over_and_counted(
     assert run.is_cut
 
 
-def test_reading_runs_needs_no_simulator_and_no_network() -> None:
+def test_reading_runs_needs_no_simulator_and_no_network():
     heavy = {"litellm", "rich", "matplotlib", "aiohttp"}
     heavy |= set(ENGINES)
     code = (
@@ -93,9 +88,7 @@ def value(run: Run, *about: str, **way: str) -> float:
 
 @laws
 @given(record_lists(), st.sampled_from(["skip", "count"]))
-def test_each_value_of_plans_is_the_micro_average_of_its_records(
-    records: Records, missing: str
-) -> None:
+def test_each_value_of_plans_is_the_micro_average_of_its_records(records, missing):
     left_out = {"missing", "api_error"} if missing == "skip" else set()
     frame = all_estimates(run_of(records, manifest(missing=missing)))
     frame = frame[frame["measure"].isin(["precision", "recall", "f1"])]
@@ -124,7 +117,7 @@ def test_each_value_of_plans_is_the_micro_average_of_its_records(
 
 @laws
 @given(record_lists())
-def test_seeds_alone_give_mean_and_deviation(records: Records) -> None:
+def test_seeds_alone_give_mean_and_deviation(records):
     keys = ["measure", "model", "setting", "matcher", "criterion", "cell"]
     pooled = all_estimates(run_of(records, manifest())).set_index(keys)
     alone = []
@@ -141,7 +134,7 @@ def test_seeds_alone_give_mean_and_deviation(records: Records) -> None:
 
 @laws
 @given(record_lists())
-def test_shares_of_wrong_steps_and_of_blocks_add_up_to_one(records: Records) -> None:
+def test_shares_of_wrong_steps_and_of_blocks_add_up_to_one(records):
     frame = all_estimates(run_of(records, manifest()))
     ways = ["model", "setting", "matcher", "criterion", "cell"]
     for prefix, left_out in (("wrong_", ""), ("blocks_", "blocks_support")):
@@ -150,7 +143,7 @@ def test_shares_of_wrong_steps_and_of_blocks_add_up_to_one(records: Records) -> 
         assert np.allclose(sums, 1)
 
 
-def test_level_1_has_its_own_criterion_and_overall_counts_every_scene_once() -> None:
+def test_level_1_has_its_own_criterion_and_overall_counts_every_scene_once():
     two = record(scores=[score(2, 1, 2), score(3, 0, 1, criterion="selection")])
     assert LEVELS["000"] == (1, 2)
     run = run_of([two], manifest())
@@ -203,7 +196,7 @@ def complete(right: dict[Any, int], **more: Any) -> Records:
 
 @given(st.fixed_dictionaries({subtask: st.integers(0, 4) for subtask in SUBTASKS}))
 @laws
-def test_averages_of_questions_are_unweighted_means_of_their_parts(right: dict[Any, int]) -> None:
+def test_averages_of_questions_are_unweighted_means_of_their_parts(right):
     run = questions(complete(right))
     means = []
     for category, subtasks in CATEGORIES.items():
@@ -214,7 +207,7 @@ def test_averages_of_questions_are_unweighted_means_of_their_parts(right: dict[A
     assert value(run, "accuracy") == pytest.approx(np.mean(means))
 
 
-def test_a_mean_of_which_a_part_was_not_answered_has_no_value() -> None:
+def test_a_mean_of_which_a_part_was_not_answered_has_no_value():
     records = [one for one in complete(dict.fromkeys(SUBTASKS, 4))
                if one["question"]["subtask"] != "SI"]  # fmt: skip
     run = questions(records)
@@ -224,16 +217,14 @@ def test_a_mean_of_which_a_part_was_not_answered_has_no_value() -> None:
 
 
 @pytest.mark.parametrize(("missing", "n", "wanted"), [("count", 4, 0.5), ("skip", 3, 2 / 3)])
-def test_missing_answers_count_as_wrong_or_are_left_out(
-    missing: str, n: int, wanted: float
-) -> None:
+def test_missing_answers_count_as_wrong_or_are_left_out(missing, n, wanted):
     records = [answered("SH", number, "A" if number < 2 else "B") for number in range(3)]
     records.append(answered("SH", 3, None, outcome="api_error"))
     row = of(questions(records, missing=missing), "accuracy", "SH")
     assert (row["n"], row["value"]) == (n, pytest.approx(wanted))
 
 
-def test_circular_needs_every_rotation_of_a_seed() -> None:
+def test_circular_needs_every_rotation_of_a_seed():
     def rotations(number: int, seed: int, wrong: int | None) -> Records:
         return [
             answered("SH", number, "B" if by == wrong else LETTERS[by], right=LETTERS[by],
@@ -279,7 +270,7 @@ def episodes(*records: dict[str, Any], missing: str = "skip") -> Run:
     return run_of(records, facts)
 
 
-def test_episodes_by_hand() -> None:
+def test_episodes_by_hand():
     run = episodes(
         episode("alpha", "001", "pppop", "completed"),
         episode("alpha", "002", "ppd", "done"),

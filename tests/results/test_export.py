@@ -61,7 +61,7 @@ def folder(tmp_path: Path) -> Path:
     return made
 
 
-def test_rows_hold_what_was_asked_answered_and_counted(folder: Path) -> None:
+def test_rows_hold_what_was_asked_answered_and_counted(folder):
     frame = export_frame(load_run(folder)).set_index("sample")
     assert len(frame) == 13
     row = frame.loc["full_planning/alpha/002/s0"]
@@ -80,7 +80,7 @@ def test_rows_hold_what_was_asked_answered_and_counted(folder: Path) -> None:
     assert frame.loc["full_planning/beta/000/s0", "error"] == "busy"
 
 
-def test_csv_and_parquet_come_back_as_the_same_rows(folder: Path) -> None:
+def test_csv_and_parquet_come_back_as_the_same_rows(folder):
     run = load_run(folder)
     (csv,), (parquet,) = export_run(run, "csv"), export_run(run, "parquet")
     assert csv == folder / "export" / "csv" / "records.csv"
@@ -90,7 +90,7 @@ def test_csv_and_parquet_come_back_as_the_same_rows(folder: Path) -> None:
     assert json.loads(from_csv["levels"][0]) == list(from_parquet["levels"][0]) == [1, 2]
 
 
-def test_a_hugging_face_dataset_has_the_right_rows(folder: Path, tmp_path: Path) -> None:
+def test_a_hugging_face_dataset_has_the_right_rows(folder, tmp_path):
     datasets = pytest.importorskip("datasets", reason=HF)
     frame = export_frame(load_run(folder))
     parquet, _ = huggingface.write_records(load_run(folder))
@@ -122,9 +122,7 @@ def rows_of(path: Path) -> list[dict[str, str]]:
         return list(csv.DictReader(file, delimiter="\t"))
 
 
-def test_tsv_files_are_as_vlmevalkit_reads_them(
-    question_set: QuestionSet, scenes: Dataset, tmp_path: Path
-) -> None:
+def test_tsv_files_are_as_vlmevalkit_reads_them(question_set, scenes, tmp_path):
     out, asked_of = tmp_path / "out", str(question_set.root)
     files = write_vlmevalkit(out, asked_of, str(scenes.root), None, 128)
     choice, ordering = (rows_of(file) for file in files)
@@ -155,9 +153,7 @@ def test_tsv_files_are_as_vlmevalkit_reads_them(
     assert all(len(row["answer"]) == 4 for row in ordering)
 
 
-def test_a_hugging_face_dataset_has_questions_and_pictures(
-    question_set: QuestionSet, scenes: Dataset, tmp_path: Path
-) -> None:
+def test_a_hugging_face_dataset_has_questions_and_pictures(question_set, scenes, tmp_path):
     datasets = pytest.importorskip("datasets", reason=HF)
     out, asked_of = tmp_path / "out", str(question_set.root)
     parquet, _ = huggingface.write_questions(out, asked_of, str(scenes.root), None, 128)
@@ -170,9 +166,7 @@ def test_a_hugging_face_dataset_has_questions_and_pictures(
             assert [image.size for image in row["images"]] == [(128, 128)] * len(row["labels"])
 
 
-def test_scenes_with_their_pictures_and_all_that_is_known_of_them(
-    scenes: Dataset, tmp_path: Path
-) -> None:
+def test_scenes_with_their_pictures_and_all_that_is_known_of_them(scenes, tmp_path):
     datasets = pytest.importorskip("datasets", reason=HF)
     parquet, card = huggingface.write_scenes(tmp_path / "out", str(scenes.root), None, 128)
     cache = str(tmp_path / "cache")

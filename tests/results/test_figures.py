@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pytest
 
 from phyblock.results.estimates import Headline
@@ -46,7 +44,7 @@ def run() -> Run:
     return run_of(records(), manifest(models=MODELS, seeds=[0]))
 
 
-def test_lines_over_levels_and_cost_show_the_headline(run: Run) -> None:
+def test_lines_over_levels_and_cost_show_the_headline(run):
     values = Headline(run, TRACK).values
     drawn = levels(run, track=TRACK)
     assert drawn is not None
@@ -61,7 +59,7 @@ def test_lines_over_levels_and_cost_show_the_headline(run: Run) -> None:
     )
 
 
-def test_shares_fill_a_bar(run: Run) -> None:
+def test_shares_fill_a_bar(run):
     for table in ("errors", "losses"):
         drawn = shares(run, track=TRACK, table=table)
         assert drawn is not None
@@ -72,7 +70,7 @@ def test_shares_fill_a_bar(run: Run) -> None:
         assert all(width == pytest.approx(100) for width in widths.values())
 
 
-def test_a_run_without_an_answer_draws_nothing_and_does_not_fail(tmp_path: Path) -> None:
+def test_a_run_without_an_answer_draws_nothing_and_does_not_fail(tmp_path):
     failed = [
         record(model, scene, 0, [], outcome="api_error") for model in MODELS for scene in LEVELS
     ]
@@ -80,7 +78,7 @@ def test_a_run_without_an_answer_draws_nothing_and_does_not_fail(tmp_path: Path)
     assert write_paper_figures(load_run(tmp_path), (), Look()) == ()
 
 
-def test_a_forest_has_a_row_a_pair_or_of_two_models_a_row_a_part(run: Run) -> None:
+def test_a_forest_has_a_row_a_pair_or_of_two_models_a_row_a_part(run):
     for chosen, rows in ((run, 3), (of_models(run, MODELS[:2]), 5)):
         drawn = forest(chosen, track=TRACK)
         assert drawn is not None
@@ -88,7 +86,7 @@ def test_a_forest_has_a_row_a_pair_or_of_two_models_a_row_a_part(run: Run) -> No
     assert forest(of_models(run, MODELS[:1]), track=TRACK) is None
 
 
-def test_files_are_the_same_each_time_in_three_formats_with_captions(tmp_path: Path) -> None:
+def test_files_are_the_same_each_time_in_three_formats_with_captions(tmp_path):
     folder = write_run(tmp_path / "run", records(), manifest(models=MODELS, seeds=[0]))
     run = load_run(folder)
     first = {file: file.read_bytes() for file in write_paper_figures(run, (), Look())}

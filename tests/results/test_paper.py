@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import csv
 from collections import defaultdict
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -17,9 +16,7 @@ from tests.web.factory import manifest, record, run_of, score
     ("levels", "has_overall"),
     [([1, 2], False), ([3], False), ([1, 3, 4], False), ([2, 3, 4], True), ([1, 2, 3, 4], True)],
 )
-def test_overall_is_compared_where_the_paper_s_levels_were_run(
-    levels: list[int], has_overall: bool
-) -> None:
+def test_overall_is_compared_where_the_paper_s_levels_were_run(levels, has_overall):
     facts = manifest(models=[("mine", "GPT-4o")], seeds=[0], levels=levels)
     records = [
         record("mine", scene, scores=[score(1, 1, 3, matcher="paper")])
@@ -30,7 +27,7 @@ def test_overall_is_compared_where_the_paper_s_levels_were_run(
     assert overall["ours"].notna().all() == has_overall
 
 
-def test_ours_stands_beside_the_published_number_of_the_same_cell() -> None:
+def test_ours_stands_beside_the_published_number_of_the_same_cell():
     facts = manifest(models=[("mine", "GPT-4o"), ("seeded", "GPT-4.1")], seeds=[0, 1])
     plans = [record("seeded", scene, seed, [score(2 + seed, 1, 1)])
              for scene in ("000", "001") for seed in (0, 1)]  # fmt: skip
@@ -52,7 +49,7 @@ def test_ours_stands_beside_the_published_number_of_the_same_cell() -> None:
     assert two.loc[["object_property", "overall"], "ours"].isna().all()
 
 
-def test_the_published_numbers_come_out_of_the_official_counts(official_dir: Path) -> None:
+def test_the_published_numbers_come_out_of_the_official_counts(official_dir):
     scenes: dict[tuple[str, str], list[dict[str, Any]]] = defaultdict(list)
     levels: dict[str, set[int]] = defaultdict(set)
     with (official_dir / "expected" / "assembly_counts.csv").open(newline="") as file:
@@ -80,7 +77,7 @@ def test_the_published_numbers_come_out_of_the_official_counts(official_dir: Pat
     assert (table["difference"].abs() > 0.06).sum() <= 1
 
 
-def test_each_published_model_has_15_cells() -> None:
+def test_each_published_model_has_15_cells():
     facts = manifest(models=[("mine", "GPT-4o"), "other"], seeds=[0])
     scores = [score(1, 1, 3), score(1, 3, 1, matcher="paper")]
     run = run_of([record("mine", "001", scores=scores)], facts)

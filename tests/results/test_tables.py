@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shutil
 import subprocess
-from pathlib import Path
 from typing import Any
 
 import pandas as pd
@@ -52,11 +51,11 @@ def shown_numbers(run: Run, track: str) -> int:
 
 @laws
 @given(record_lists(), st.sampled_from(["skip", "count"]))
-def test_tables_of_plans_show_estimates(records: Records, missing: str) -> None:
+def test_tables_of_plans_show_estimates(records, missing):
     shown_numbers(run_of(records, manifest(missing=missing)), "full_planning")
 
 
-def test_tables_of_episodes_and_questions_show_estimates() -> None:
+def test_tables_of_episodes_and_questions_show_estimates():
     ran = episodes(
         episode("alpha", "001", "pppop", "completed"),
         episode("alpha", "002", "ppd", "done"),
@@ -68,7 +67,7 @@ def test_tables_of_episodes_and_questions_show_estimates() -> None:
 
 @laws
 @given(record_lists())
-def test_outcomes_split_what_was_expected(records: Records) -> None:
+def test_outcomes_split_what_was_expected(records):
     table = coverage_frame(run_of(records, manifest()))
     assert table["model"].tolist() == ["alpha", "beta"]
     assert (table["recorded"] + table["not_run"] == table["expected"]).all()
@@ -79,7 +78,7 @@ def test_outcomes_split_what_was_expected(records: Records) -> None:
         assert table[outcome].iloc[0] == sum(ends)
 
 
-def test_replies_that_are_missing_and_seeds_that_were_refused_stand_under_tables() -> None:
+def test_replies_that_are_missing_and_seeds_that_were_refused_stand_under_tables():
     records = [
         record(scene="001", scores=[score(1, 0, 0)], seed_sent=False),
         record(scene="001", seed=1, scores=[score(0, 0, 4)], outcome="api_error"),
@@ -93,7 +92,7 @@ def test_replies_that_are_missing_and_seeds_that_were_refused_stand_under_tables
         assert "Values pool the samples of 2 seeds." in notes
 
 
-def test_costs_are_of_what_is_known_and_say_how_much_is_not() -> None:
+def test_costs_are_of_what_is_known_and_say_how_much_is_not():
     records = [
         record(scene="000", prompt_tokens=10, completion_tokens=5, cost_usd=0.5, latency_s=1.0),
         record(scene="001", prompt_tokens=20, completion_tokens=7, cost_usd=0.25, latency_s=2.0),
@@ -112,7 +111,7 @@ def test_costs_are_of_what_is_known_and_say_how_much_is_not() -> None:
     assert (beta["cost_usd"], beta["prompt_tokens"], beta["attempts"]) == (0, 0, 3)
 
 
-def test_an_unknown_cost_is_never_shown_as_zero() -> None:
+def test_an_unknown_cost_is_never_shown_as_zero():
     facts = manifest(models=["unknown", "free", "dear", "cached"])
     records = [
         record("unknown"),
@@ -139,16 +138,14 @@ def records_of(model: str) -> Records:
 
 @settings(laws, max_examples=3)
 @given(record_lists())
-def test_writing_again_changes_nothing(
-    tmp_path_factory: pytest.TempPathFactory, records: Records
-) -> None:
+def test_writing_again_changes_nothing(tmp_path_factory, records):
     folder = write_run(tmp_path_factory.mktemp("runs") / "run", records, manifest())
     first = {file: file.read_bytes() for file in write_tables(folder).files}
     assert {file: file.read_bytes() for file in write_tables(folder).files} == first
     assert {file.name for file in folder.iterdir()} == {"run.yaml", "records.jsonl", "tables", LIST}
 
 
-def test_the_summary_ranks_models_and_says_who_is_above_the_blind_baseline() -> None:
+def test_the_summary_ranks_models_and_says_who_is_above_the_blind_baseline():
     tp = {"alpha": 1, "beta": 4, "random": 0, "goal-blind": 2}
     facts = manifest(models=list(tp), seeds=[0], levels=[3, 4])
     for model in facts["models"][2:]:
@@ -178,7 +175,7 @@ LATEX = next(filter(shutil.which, ("pdflatex", "lualatex")), None)
 
 
 @pytest.mark.skipif(LATEX is None, reason="neither pdflatex nor lualatex is installed")
-def test_latex_compiles_inside_any_document(tmp_path: Path) -> None:
+def test_latex_compiles_inside_any_document(tmp_path):
     models = [r"all & % $ # _ { } ~ ^ \ < > | \" ` ' -- [x] *", "[first]", "*star", "Ünïcode"]
     folder = write_run(
         tmp_path / "run",
@@ -216,7 +213,7 @@ TABLE = TextTable(
 )
 
 
-def test_markdown_by_hand() -> None:
+def test_markdown_by_hand():
     assert to_markdown(TABLE) == (
         "**Precision &amp; recall (%)**\n"
         "\n"
@@ -229,7 +226,7 @@ def test_markdown_by_hand() -> None:
     )
 
 
-def test_latex_by_hand() -> None:
+def test_latex_by_hand():
     assert to_latex(TABLE, "x").splitlines()[8:-2] == [
         r"\begin{tabular}{@{}lrr@{}}",
         r"\toprule",

@@ -31,7 +31,7 @@ def counted_once(server: BatchServer, samples: int) -> bool:
     return sum(server.asked.values()) == samples and len(set(server.asked.values())) == 1
 
 
-def test_all_tracks_of_one_turn_go_out_in_batches_at_half_the_price(workspace: Workspace) -> None:
+def test_all_tracks_of_one_turn_go_out_in_batches_at_half_the_price(workspace):
     write_questions(workspace.root / "questions", questions(subtasks=["SH", "OR"], per_subtask=1))
     with Running(OpenAIBatches()) as running:
         tracks = {"tracks": ["full_planning", "vqa"]}
@@ -59,7 +59,7 @@ def test_all_tracks_of_one_turn_go_out_in_batches_at_half_the_price(workspace: W
             assert reply["cost_usd"] == pytest.approx((1000 * 2.5 + 40 * 10) / 1e6 / 2)
 
 
-def test_a_run_that_waits_is_stopped_and_goes_on_by_the_same_command(workspace: Workspace) -> None:
+def test_a_run_that_waits_is_stopped_and_goes_on_by_the_same_command(workspace):
     """Between both commands the provider is asked nothing, and the estimate asks for no money."""
     with Running(OpenAIBatches(batch=BatchFaults(looks=10**6))) as running:
         server = running.server
@@ -105,7 +105,7 @@ def test_a_run_that_waits_is_stopped_and_goes_on_by_the_same_command(workspace: 
         assert counted_once(server, 10)
 
 
-def test_kills_of_the_process_lose_nothing_and_ask_nothing_twice(workspace: Workspace) -> None:
+def test_kills_of_the_process_lose_nothing_and_ask_nothing_twice(workspace):
     """When a batch is made and nobody heard, then when its answers are on their way."""
     with Running(OpenAIBatches()) as running:
         server = running.server

@@ -49,7 +49,7 @@ def overall_f1(workspace: Workspace) -> dict[str, float]:
     }
 
 
-def test_a_model_that_looks_is_right_in_every_order(workspace: Workspace) -> None:
+def test_a_model_that_looks_is_right_in_every_order(workspace):
     tasks = tasks_of(workspace)
     shown = [presented(task, seed, "shuffled") for task in tasks.values() for seed in SEEDS]
     answers = {
@@ -95,7 +95,7 @@ def check_scored_again(workspace: Workspace) -> None:
     assert first == again
 
 
-def test_blind_leaves_out_the_goal_and_leaves_the_candidates(workspace: Workspace) -> None:
+def test_blind_leaves_out_the_goal_and_leaves_the_candidates(workspace):
     grid = digest(candidates_png(tasks_of(workspace)["t1"].candidates, STYLE))
     with Running(sighted({(grid,): "Step1: Move block with index 1"})) as running:
         workspace.write_models(running.url, "alpha", transport="direct")
@@ -114,7 +114,7 @@ def test_blind_leaves_out_the_goal_and_leaves_the_candidates(workspace: Workspac
     assert all("is not available" in text for text in texts)
 
 
-def test_episodes_are_shuffled_and_blind_as_well(workspace: Workspace) -> None:
+def test_episodes_are_shuffled_and_blind_as_well(workspace):
     models = ["oracle", "first-pose", "all-candidates", "goal-blind"]
     workspace.write_suite(
         tracks=["step_planning"],
@@ -144,7 +144,7 @@ def test_episodes_are_shuffled_and_blind_as_well(workspace: Workspace) -> None:
     )
 
 
-def test_blind_baselines_are_scored_beside_models_without_being_named(workspace: Workspace) -> None:
+def test_blind_baselines_are_scored_beside_models_without_being_named(workspace):
     workspace.write_suite(models=["oracle"], levels=[4])
     assert workspace.run().code == 0
     assert {record["model"] for record in workspace.records()} == {"oracle"}
@@ -193,9 +193,7 @@ def asked(server: OpenAIChat) -> list[str]:
     return [seen.sample for seen in server.seen]
 
 
-def test_every_way_is_asked_once_and_the_reference_is_what_a_plain_suite_asks(
-    workspace: Workspace,
-) -> None:
+def test_every_way_is_asked_once_and_the_reference_is_what_a_plain_suite_asks(workspace):
     with Running(OpenAIChat(say=moody)) as running:
         server = running.server
         assert isinstance(server, OpenAIChat)
@@ -236,7 +234,7 @@ def check_repeats(records: list[Raw], server: OpenAIChat) -> None:
         assert ("shown" in record) == ("candidate_order" in variant)
 
 
-def test_questions_and_episodes_vary_what_they_know(workspace: Workspace) -> None:
+def test_questions_and_episodes_vary_what_they_know(workspace):
     """Episodes without a key; recordings were asked in one way."""
     workspace.write_suite(
         tracks=["step_planning"], levels=[4], vary={"view": ["oblique", "top"], "repeats": 2}

@@ -49,7 +49,7 @@ def spent(workspace: Workspace) -> float:
     return sum(record["reply"]["cost_usd"] for record in workspace.records())
 
 
-def test_the_limit_is_not_passed_and_a_higher_one_goes_on(workspace: Workspace) -> None:
+def test_the_limit_is_not_passed_and_a_higher_one_goes_on(workspace):
     with Running(OpenAIChat()) as running:
         server = running.server
         workspace.write_models(running.url, "alpha", price=PRICE, max_tokens=100)
@@ -76,8 +76,8 @@ def test_the_limit_is_not_passed_and_a_higher_one_goes_on(workspace: Workspace) 
 
 @pytest.mark.parametrize(("prompt", "completion"), [(40_000, 40), (1000, 2500)])
 def test_a_server_that_counts_more_than_is_expected_does_not_pass_the_limit_at_once(
-    workspace: Workspace, prompt: int, completion: int
-) -> None:
+    workspace, prompt, completion
+):
     usd = (prompt * PRICE["input"] + completion * PRICE["output"]) / 1e6
     usage = {"prompt_tokens": prompt, "completion_tokens": completion}
     with Running(OpenAIChat(usage=usage)) as running:
@@ -90,7 +90,7 @@ def test_a_server_that_counts_more_than_is_expected_does_not_pass_the_limit_at_o
     assert spent(workspace) <= 5 * usd
 
 
-def test_a_model_is_asked_no_more_when_its_own_limit_is_reached(workspace: Workspace) -> None:
+def test_a_model_is_asked_no_more_when_its_own_limit_is_reached(workspace):
     with Running(OpenAIChat()) as running:
         workspace.write_yaml("models.yaml", {
             name: {"id": f"openai/{name}", "api_base": f"{running.url}/v1", "price": PRICE,
@@ -107,7 +107,7 @@ def test_a_model_is_asked_no_more_when_its_own_limit_is_reached(workspace: Works
     assert sum(record["model"] == "beta" for record in workspace.records()) == 5
 
 
-def test_a_dry_run_says_what_it_would_cost_and_asks_nothing(workspace: Workspace) -> None:
+def test_a_dry_run_says_what_it_would_cost_and_asks_nothing(workspace):
     with Running(OpenAIChat()) as running:
         workspace.write_models(running.url, "alpha", price=PRICE, max_tokens=9000)
         workspace.write_suite(models=["alpha", "random"], seeds=[0, 1])
@@ -131,9 +131,7 @@ def test_a_dry_run_says_what_it_would_cost_and_asks_nothing(workspace: Workspace
     [OpenAIChat(usage=None), OpenAIChat(Faults(mode="html")), OpenAIChat(Faults(mode="reset"))],
     ids=["no usage", "no reply", "no answer"],
 )
-def test_what_an_earlier_run_may_have_paid_counts_in_the_next(
-    workspace: Workspace, server: OpenAIChat
-) -> None:
+def test_what_an_earlier_run_may_have_paid_counts_in_the_next(workspace, server):
     dearest_reply_usd = 1000 * PRICE["output"] / 1e6
     with Running(server) as running:
         workspace.write_models(running.url, "alpha", price=PRICE, max_tokens=1000)
@@ -211,7 +209,7 @@ def dollars(prompt_tokens: int, replies: int) -> float:
     return (prompt_tokens * TARIFF["input"] + replies * COMPLETION * TARIFF["output"]) / 1e6
 
 
-def test_a_dry_run_is_near_the_bill_of_every_provider(workspace: Workspace) -> None:
+def test_a_dry_run_is_near_the_bill_of_every_provider(workspace):
     with ExitStack() as stack:
         servers = begin(workspace, stack)
         plan = planned(workspace)
@@ -240,8 +238,8 @@ def test_a_dry_run_is_near_the_bill_of_every_provider(workspace: Workspace) -> N
     st.lists(st.tuples(st.sampled_from("abc"), st.integers(0, 2000)), max_size=80),
 )
 def test_replies_of_one_kind_say_nothing_of_another_and_none_is_longer_than_it_can_be(
-    calls: list[tuple[str, int, int]], replies: list[tuple[str, int]]
-) -> None:
+    calls, replies
+):
     row = Estimate(ModelConfig(name="m", id="openai/m"), 100, Tariff(input=0.0, output=10.0))
     for kind, usual, more in calls:
         row.add_call(CallEstimate(100, usual, usual + more), kind)
@@ -258,7 +256,7 @@ def test_replies_of_one_kind_say_nothing_of_another_and_none_is_longer_than_it_c
 
 
 @pytest.mark.parametrize("track", ["full_planning", "step_planning"])
-def test_texts_count_as_the_public_vocabulary_does(workspace: Workspace, track: str) -> None:
+def test_texts_count_as_the_public_vocabulary_does(workspace, track):
     workspace.write_models("http://localhost:1", "m")
     suite = {"name": "s", "tracks": [track], "models": ["m"], "limit": 4}
     workspace.write_yaml("suite.yaml", suite)
@@ -275,7 +273,7 @@ def test_texts_count_as_the_public_vocabulary_does(workspace: Workspace, track: 
     assert counted == pytest.approx(sum(map(o200k_tokens, texts)), rel=0.02)
 
 
-def test_episodes_are_billed_no_more_than_a_dry_run_expects(workspace: Workspace) -> None:
+def test_episodes_are_billed_no_more_than_a_dry_run_expects(workspace):
     server = BillingOpenAI(o200k_tokens, tile_tokens, 3, say=said)
     with Running(server) as running:
         entry = {"id": "openai/gpt-4o-2024-08-06", "api_base": f"{running.url}/v1", "price": TARIFF}
@@ -292,7 +290,7 @@ def test_episodes_are_billed_no_more_than_a_dry_run_expects(workspace: Workspace
     assert a_call == pytest.approx(expected, rel=WITHIN)
 
 
-def test_a_run_without_a_limit_counts_once_there_is_one(workspace: Workspace) -> None:
+def test_a_run_without_a_limit_counts_once_there_is_one(workspace):
     with Running(OpenAIChat(Faults(server_error=0.5))) as running:
         workspace.write_models(running.url, "alpha", price=PRICE, max_tokens=100)
         workspace.write_suite(

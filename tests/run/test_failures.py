@@ -53,9 +53,7 @@ def coverage(workspace: Workspace) -> dict[str, Raw]:
 
 
 @pytest.mark.parametrize("samples", [200, pytest.param(1000, marks=pytest.mark.slow)])
-def test_every_sample_is_scored_through_the_mix_of_faults(
-    workspace: Workspace, samples: int
-) -> None:
+def test_every_sample_is_scored_through_the_mix_of_faults(workspace, samples):
     faults = replace(ISSUE_MIX, retry_after="0")
     with Running(OpenAIChat(faults, keep=False)) as running:
         workspace.write_models(running.url, "alpha")
@@ -74,7 +72,7 @@ def test_every_sample_is_scored_through_the_mix_of_faults(
     assert running.server.requests == sum(record["reply"]["attempts"] for record in records)
 
 
-def test_a_model_that_cannot_answer_is_stopped_alone(workspace: Workspace) -> None:
+def test_a_model_that_cannot_answer_is_stopped_alone(workspace):
     servers = [OpenAIChat(Faults(mode=mode)) for mode in ("401", "404", "ok")]
     with Running(servers[0]) as locked, Running(servers[1]) as unknown, Running(servers[2]) as fine:
         urls = {"locked": locked.url, "unknown": unknown.url, "fine": fine.url}
@@ -108,7 +106,7 @@ def test_a_model_that_cannot_answer_is_stopped_alone(workspace: Workspace) -> No
     assert [server.ended["ok"] for server in servers] == [100, 100, 100]
 
 
-def test_a_server_that_is_gone_stops_its_model_and_leaves_the_samples(workspace: Workspace) -> None:
+def test_a_server_that_is_gone_stops_its_model_and_leaves_the_samples(workspace):
     workspace.write_models("http://127.0.0.1:9", "alpha")
     workspace.write_suite(models=["alpha", "random"], seeds=list(range(20)), limits=TWICE)
     done = workspace.run()
@@ -121,7 +119,7 @@ def test_a_server_that_is_gone_stops_its_model_and_leaves_the_samples(workspace:
     assert coverage(workspace)["alpha"]["api_error"] == "0"
 
 
-def test_each_way_to_fail_is_an_outcome_of_its_own(workspace: Workspace) -> None:
+def test_each_way_to_fail_is_an_outcome_of_its_own(workspace):
     endings = {1: "400", 2: "policy", 3: "length", 4: "filtered", 5: "blank"}
     outcomes = ("ok", "api_error", "refusal", "truncated", "refusal", "parse_failure")
     with Running(BySeed(endings)) as running:
@@ -143,9 +141,7 @@ def test_each_way_to_fail_is_an_outcome_of_its_own(workspace: Workspace) -> None
     }
 
 
-def test_a_sample_whose_every_attempt_failed_is_asked_again_by_the_next_run(
-    workspace: Workspace,
-) -> None:
+def test_a_sample_whose_every_attempt_failed_is_asked_again_by_the_next_run(workspace):
     with Running(BySeed({1: "500"})) as running:
         workspace.write_models(running.url, "alpha")
         workspace.write_suite(models=["alpha"], seeds=[0, 1], limits=TWICE)
@@ -155,7 +151,7 @@ def test_a_sample_whose_every_attempt_failed_is_asked_again_by_the_next_run(
         assert running.server.requests == 5 + 5 * 2
         assert coverage(workspace)["alpha"]["api_error"] == "5"
 
-        running.server._endings = {}  # type: ignore[attr-defined]
+        running.server._endings = {}
         again = workspace.run()
         assert again.code == 0
         assert running.server.requests == 20
@@ -184,9 +180,7 @@ def locked(workspace: Workspace) -> Iterator[None]:
 
 
 @pytest.mark.parametrize("room", [3, SAMPLES - 1])
-def test_a_cache_that_takes_no_more_is_said_once_and_all_is_recorded(
-    workspace: Workspace, room: int
-) -> None:
+def test_a_cache_that_takes_no_more_is_said_once_and_all_is_recorded(workspace, room):
     path = workspace.cache / "replies.sqlite"
     ReplyCache(path).close()
     db = sqlite3.connect(path)
@@ -214,9 +208,7 @@ def test_a_cache_that_takes_no_more_is_said_once_and_all_is_recorded(
         assert running.server.requests == SAMPLES
 
 
-def test_a_disk_that_takes_neither_replies_nor_records_ends_the_run_after_few_calls(
-    workspace: Workspace,
-) -> None:
+def test_a_disk_that_takes_neither_replies_nor_records_ends_the_run_after_few_calls(workspace):
     with Running(OpenAIChat(Faults(latency_s=0.01))) as running:
         prepare(workspace, running.url, AT_ONCE)
         assert workspace.run("--limit", "1", "--models", "random").code == 0
@@ -235,7 +227,7 @@ def test_a_disk_that_takes_neither_replies_nor_records_ends_the_run_after_few_ca
         assert len({record["sample"] for record in workspace.records()}) == SAMPLES
 
 
-def test_ctrl_c_ends_a_run_whose_cache_is_locked(workspace: Workspace) -> None:
+def test_ctrl_c_ends_a_run_whose_cache_is_locked(workspace):
     with Running(OpenAIChat()) as running, locked(workspace):
         prepare(workspace, running.url, AT_ONCE)
         with workspace.start() as process:
@@ -249,7 +241,7 @@ def test_ctrl_c_ends_a_run_whose_cache_is_locked(workspace: Workspace) -> None:
 
 
 @pytest.mark.slow
-def test_a_run_with_a_locked_cache_ends_as_without_one(workspace: Workspace) -> None:
+def test_a_run_with_a_locked_cache_ends_as_without_one(workspace):
     with Running(OpenAIChat()) as running, locked(workspace):
         prepare(workspace, running.url, AT_ONCE)
         done = workspace.run()

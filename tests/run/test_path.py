@@ -11,7 +11,7 @@ from types import FrameType
 import phyblock as package
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
-from tests.workspace import Workspace, call
+from tests.workspace import call
 
 ROOT = Path(package.__file__).parent
 MOST_ENTERED = 24
@@ -27,7 +27,7 @@ IMPORTED = (
 )
 
 
-def test_one_sample_goes_through_few_modules(inside: Workspace) -> None:
+def test_one_sample_goes_through_few_modules(inside):
     """From the arrival of the second request to that of the third: the end of one sample and the
     beginning of the next, in every thread.
     """
@@ -54,7 +54,7 @@ def test_one_sample_goes_through_few_modules(inside: Workspace) -> None:
     assert len(modules) <= MOST_ENTERED, " ".join(sorted(map(str, modules)))
 
 
-def test_one_sample_of_a_baseline_imports_few_modules(workspace: Workspace) -> None:
+def test_one_sample_of_a_baseline_imports_few_modules(workspace):
     workspace.write_suite(models=["random"], levels=[2], settings=["A"])
     command = [sys.executable, "-c", IMPORTED, "run", "suite.yaml", "--limit", "1", "--out", "out"]
     done = subprocess.run(

@@ -14,7 +14,6 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import psutil
@@ -76,9 +75,7 @@ def prepare(workspace: Workspace, url: str, *names: str) -> None:
 
 
 @pytest.mark.parametrize("name", [signal.SIGINT, signal.SIGTERM])
-def test_calls_under_way_are_waited_for_and_nothing_more_is_asked(
-    workspace: Workspace, name: signal.Signals
-) -> None:
+def test_calls_under_way_are_waited_for_and_nothing_more_is_asked(workspace, name):
     with Running(OpenAIChat(holds=True)) as running:
         server = running.server
         prepare(workspace, running.url, "alpha")
@@ -102,7 +99,7 @@ def test_calls_under_way_are_waited_for_and_nothing_more_is_asked(
         assert workspace.files() == before
 
 
-def test_a_second_interrupt_ends_at_once(workspace: Workspace) -> None:
+def test_a_second_interrupt_ends_at_once(workspace):
     with Running(OpenAIChat(Faults(mode="slow"))) as running:
         prepare(workspace, running.url, "alpha")
         process = workspace.start()
@@ -133,7 +130,7 @@ for folder in sys.argv[1:]:
 """
 
 
-def test_a_program_is_interrupted_in_a_run_as_well_at_any_time(workspace: Workspace) -> None:
+def test_a_program_is_interrupted_in_a_run_as_well_at_any_time(workspace):
     opening, asking, waiting = folders = [workspace.root / name for name in ("a", "b", "c")]
     told = workspace.root / "told"
     slow = OpenAIChat(Faults(latency_s=1.0))
@@ -211,9 +208,7 @@ def nobody(_: RunEvent) -> None:
 
 
 @pytest.mark.parametrize("place", ["judge", "watch"])
-def test_a_mistake_of_ours_loses_no_call_under_way(
-    workspace: Workspace, monkeypatch: pytest.MonkeyPatch, place: str
-) -> None:
+def test_a_mistake_of_ours_loses_no_call_under_way(workspace, monkeypatch, place):
     judge = FullPlanning.judge
     judged: list[object] = []
 
@@ -243,9 +238,7 @@ def test_a_mistake_of_ours_loses_no_call_under_way(
     assert len(workspace.records()) == AT_ONCE - (place == "judge")
 
 
-def test_an_impatient_cancellation_keeps_all_that_was_answered(
-    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_impatient_cancellation_keeps_all_that_was_answered(workspace, monkeypatch):
     begun, may_end = threading.Event(), threading.Event()
     append, put = AppendFile.append, AppendFile.put
     answered: list[str] = []
@@ -285,8 +278,8 @@ def test_an_impatient_cancellation_keeps_all_that_was_answered(
 
 
 def test_a_reply_whose_judging_kills_workers_is_recorded_and_scored_later(
-    inside: Workspace, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+    inside, monkeypatch, capsys
+):
     workspace = inside
     workspace.write_suite(tracks=["pose_planning"], models=["oracle"], pose={"views": ["oblique"]})
     marks = workspace.root / "marks"
@@ -326,8 +319,8 @@ def test_a_reply_whose_judging_kills_workers_is_recorded_and_scored_later(
 
 
 def test_a_reply_that_is_being_judged_at_a_second_interrupt_is_recorded(
-    inside: Workspace, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+    inside, monkeypatch, capsys
+):
     workspace = inside
     workspace.write_suite(tracks=["pose_planning"], models=["oracle"], pose={"views": ["oblique"]})
 
@@ -343,7 +336,7 @@ def test_a_reply_that_is_being_judged_at_a_second_interrupt_is_recorded(
     assert [record["outcome"] for record in workspace.records()] == ["ok"]
 
 
-def test_no_process_outlives_a_killed_run(workspace: Workspace) -> None:
+def test_no_process_outlives_a_killed_run(workspace):
     """Pictures are drawn by processes of the run's own."""
     (workspace.cache / "pictures").unlink()
     with Running(OpenAIChat()) as running:
@@ -366,7 +359,7 @@ def words_of(process: psutil.Process) -> list[str]:
     return []
 
 
-def test_calls_that_wait_for_their_turn_are_not_sent_any_more(workspace: Workspace) -> None:
+def test_calls_that_wait_for_their_turn_are_not_sent_any_more(workspace):
     with Running(OpenAIChat(holds=True)) as running:
         server = running.server
         prepare(workspace, running.url, "alpha", "beta")
@@ -376,7 +369,7 @@ def test_calls_that_wait_for_their_turn_are_not_sent_any_more(workspace: Workspa
     assert len(workspace.records()) == AT_ONCE
 
 
-def test_a_wait_before_another_attempt_is_given_up(workspace: Workspace) -> None:
+def test_a_wait_before_another_attempt_is_given_up(workspace):
     with Running(OpenAIChat(Faults(rate_limited=1.0, retry_after="100"))) as running:
         server = running.server
         prepare(workspace, running.url, "alpha")
@@ -390,7 +383,7 @@ def test_a_wait_before_another_attempt_is_given_up(workspace: Workspace) -> None
     assert server.requests == AT_ONCE
 
 
-def test_a_wait_for_a_server_that_cannot_be_reached_is_given_up(workspace: Workspace) -> None:
+def test_a_wait_for_a_server_that_cannot_be_reached_is_given_up(workspace):
     prepare(workspace, "http://127.0.0.1:9", "alpha")
     process = workspace.start()
     assert process.stdout is not None
@@ -403,7 +396,7 @@ def test_a_wait_for_a_server_that_cannot_be_reached_is_given_up(workspace: Works
     assert not workspace.records()
 
 
-def test_work_of_a_worker_that_was_killed_is_done_again_once(tmp_path: Path) -> None:
+def test_work_of_a_worker_that_was_killed_is_done_again_once(tmp_path):
     async def work() -> None:
         assert await shop.work_out(partial(killed, tmp_path, 1)) == "done"
         with pytest.raises(SimulationError, match="killed twice"):
@@ -416,7 +409,7 @@ def test_work_of_a_worker_that_was_killed_is_done_again_once(tmp_path: Path) -> 
         shop.close()
 
 
-def test_what_must_be_done_is_done_though_nobody_waits() -> None:
+def test_what_must_be_done_is_done_though_nobody_waits():
     done = []
 
     async def work() -> str:

@@ -9,7 +9,6 @@ import os
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 from hypothesis import given
@@ -17,14 +16,7 @@ from hypothesis import strategies as st
 
 from phyblock.config.suite import load_suite
 from phyblock.errors import StoreError
-from phyblock.records.files import (
-    BatchLines,
-    CallLines,
-    Lines,
-    PromptLines,
-    RecordLines,
-    read_prompts,
-)
+from phyblock.records.files import BatchLines, CallLines, PromptLines, RecordLines, read_prompts
 from phyblock.records.record import Call, Reply
 from phyblock.run.plan import make_plan
 from phyblock.run.store import AppendFile, Progress, RunStore
@@ -36,9 +28,7 @@ values = st.dictionaries(st.text(max_size=5), st.text(max_size=5) | st.integers(
 
 
 @given(st.lists(st.lists(values, max_size=3), max_size=5))
-def test_what_is_appended_is_what_is_read(
-    tmp_path_factory: pytest.TempPathFactory, batches: list[list[dict[str, Any]]]
-) -> None:
+def test_what_is_appended_is_what_is_read(tmp_path_factory, batches):
     path = tmp_path_factory.mktemp("files") / "lines.jsonl"
     file = AppendFile(path)
     for batch in batches:
@@ -57,9 +47,7 @@ CHANGES: dict[str, Callable[[Path], object]] = {
 
 
 @pytest.mark.parametrize("change", CHANGES)
-def test_a_file_that_somebody_changes_meanwhile_is_not_written_on(
-    tmp_path: Path, change: str
-) -> None:
+def test_a_file_that_somebody_changes_meanwhile_is_not_written_on(tmp_path, change):
     path = tmp_path / "records.jsonl"
     file = AppendFile(path)
     file.append([{"a": 1}])
@@ -79,9 +67,7 @@ def test_a_file_that_somebody_changes_meanwhile_is_not_written_on(
     ("line", "said"),
     [(b"\0" * 40, "zero bytes"), (b"\0" * 40 + b"\n", "zero bytes"), (b"{}\r\n", "CR LF")],
 )
-def test_zero_bytes_and_foreign_line_ends_are_named(
-    tmp_path: Path, lines: Callable[[Path], Lines[Any]], line: bytes, said: str
-) -> None:
+def test_zero_bytes_and_foreign_line_ends_are_named(tmp_path, lines, line, said):
     read = lines(tmp_path)
     read.path.write_bytes(line)
     with pytest.raises(StoreError, match=rf"\.jsonl:1: is not a {read.noun}: it .*{said}"):
@@ -89,9 +75,7 @@ def test_zero_bytes_and_foreign_line_ends_are_named(
 
 
 @pytest.mark.parametrize("call", ["fstat", "write", "fsync"])
-def test_a_disk_that_fails_at_any_call_leaves_what_was_written(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, call: str
-) -> None:
+def test_a_disk_that_fails_at_any_call_leaves_what_was_written(tmp_path, monkeypatch, call):
     file = AppendFile(tmp_path / "lines.jsonl")
     file.append([{"a": 1}])
 
@@ -109,9 +93,7 @@ def test_a_disk_that_fails_at_any_call_leaves_what_was_written(
     assert (tmp_path / "lines.jsonl").read_text() == '{"a":1}\n{"a":3}\n'
 
 
-def test_a_run_is_on_disk_with_its_name_before_anything_is_asked(
-    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_run_is_on_disk_with_its_name_before_anything_is_asked(workspace, monkeypatch):
     workspace.write_suite(models=["oracle"])
     plan = make_plan(load_suite(workspace.root / "suite.yaml"), {})
     synced: list[tuple[str, set[str]]] = []
@@ -145,9 +127,7 @@ def test_a_run_is_on_disk_with_its_name_before_anything_is_asked(
         max_size=12,
     )
 )
-def test_a_limit_counts_every_call_once_and_one_without_an_end_in_full(
-    calls: list[tuple[str, str, int, bool, int | None]],
-) -> None:
+def test_a_limit_counts_every_call_once_and_one_without_an_end_in_full(calls):
     progress, expected = Progress(), dict.fromkeys("ab", 0.0)
     for number, (sample, model, most, is_ended, billed) in enumerate(calls):
         line = Call(
@@ -167,7 +147,7 @@ def test_a_limit_counts_every_call_once_and_one_without_an_end_in_full(
     assert {model: progress.limit_usd.get(model, 0.0) for model in "ab"} == expected
 
 
-def test_every_record_names_a_prompt_that_is_there(tmp_path: Path, pictures_dir: Path) -> None:
+def test_every_record_names_a_prompt_that_is_there(tmp_path, pictures_dir):
     made = Workspace(tmp_path, pictures_dir)
     made.write_scenes()
     made.write_suite(models=["alpha", "oracle"])
@@ -183,9 +163,7 @@ def test_every_record_names_a_prompt_that_is_there(tmp_path: Path, pictures_dir:
         assert hashlib.sha256(canonical.encode()).hexdigest() == digest
 
 
-def test_tables_and_page_are_made_again_where_the_run_or_what_was_made_is_another(
-    workspace: Workspace,
-) -> None:
+def test_tables_and_page_are_made_again_where_the_run_or_what_was_made_is_another(workspace):
     workspace.write_suite()
     ends, estimates = set[str](), workspace.out / "tables" / "estimates.csv"
 
@@ -210,7 +188,7 @@ def test_tables_and_page_are_made_again_where_the_run_or_what_was_made_is_anothe
     assert len(ends) == 1
 
 
-def test_a_run_whose_records_are_taken_away_asks_no_more_and_says_so(workspace: Workspace) -> None:
+def test_a_run_whose_records_are_taken_away_asks_no_more_and_says_so(workspace):
     with Running(OpenAIChat(Faults(latency_s=0.02))) as running:
         server = running.server
         workspace.write_models(running.url, "alpha", max_concurrency=2)

@@ -54,7 +54,7 @@ def scores(records: list[Raw]) -> dict[str, Raw]:
     return {r["sample"]: {k: r[k] for k in ("outcome", "parse", "scores")} for r in records}
 
 
-def test_records_in_any_order_give_the_same_tables(copy: Workspace) -> None:
+def test_records_in_any_order_give_the_same_tables(copy):
     before = copy.tables()
     path = copy.out / "records.jsonl"
     lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
@@ -66,7 +66,7 @@ def test_records_in_any_order_give_the_same_tables(copy: Workspace) -> None:
     assert copy.tables() == before
 
 
-def test_tables_are_rebuilt_byte_for_byte(copy: Workspace) -> None:
+def test_tables_are_rebuilt_byte_for_byte(copy):
     before = copy.tables()
     shutil.rmtree(copy.out / "tables")
     (copy.root / "data").rename(copy.root / "elsewhere")
@@ -75,14 +75,14 @@ def test_tables_are_rebuilt_byte_for_byte(copy: Workspace) -> None:
     assert copy.tables() == before
 
 
-def test_scoring_again_by_the_same_rules_changes_nothing(copy: Workspace) -> None:
+def test_scoring_again_by_the_same_rules_changes_nothing(copy):
     before = copy.files()
     done = copy.phyblock("score", "out", fresh=True)
     assert (done.code, done.err) == (0, "")
     assert lasting(copy.files()) == lasting(before)
 
 
-def test_replies_from_the_cache_are_worth_the_same(copy: Workspace) -> None:
+def test_replies_from_the_cache_are_worth_the_same(copy):
     # The server is gone: whatever is answered comes from the cache.
     first = scores(copy.records())
     copy.out = copy.root / "cached"
@@ -97,7 +97,7 @@ def test_replies_from_the_cache_are_worth_the_same(copy: Workspace) -> None:
     }
 
 
-def test_other_rules_score_the_same_replies_without_a_call(copy: Workspace) -> None:
+def test_other_rules_score_the_same_replies_without_a_call(copy):
     first = [record.get("reply", {}).get("text") for record in copy.records()]
     copy.out = copy.root / "official"
     rules = ("--set", "parser=official", "--set", "scoring.matchers=[paper]")
@@ -110,7 +110,7 @@ def test_other_rules_score_the_same_replies_without_a_call(copy: Workspace) -> N
     assert "matcher paper" in copy.tables()["table1.md"].decode()
 
 
-def test_without_the_cache_it_is_neither_read_nor_written(copy: Workspace) -> None:
+def test_without_the_cache_it_is_neither_read_nor_written(copy):
     first = scores(copy.records())
     before = (copy.cache / "replies.sqlite").read_bytes()
     copy.out = copy.root / "uncached"
@@ -124,7 +124,7 @@ def test_without_the_cache_it_is_neither_read_nor_written(copy: Workspace) -> No
     assert (copy.cache / "replies.sqlite").read_bytes() == before
 
 
-def test_a_cut_last_line_is_dropped_and_its_sample_run_again(copy: Workspace) -> None:
+def test_a_cut_last_line_is_dropped_and_its_sample_run_again(copy):
     path = copy.out / "records.jsonl"
     whole = path.read_bytes()
     path.write_bytes(whole[:-30])
@@ -135,7 +135,7 @@ def test_a_cut_last_line_is_dropped_and_its_sample_run_again(copy: Workspace) ->
     assert load_run(copy.out).records["sample"].is_unique
 
 
-def test_a_second_process_is_refused_and_the_first_goes_on(workspace: Workspace) -> None:
+def test_a_second_process_is_refused_and_the_first_goes_on(workspace):
     with Running(OpenAIChat(holds=True)) as running:
         workspace.write_models(running.url, "alpha")
         workspace.write_suite(models=["alpha"])
@@ -153,7 +153,7 @@ def test_a_second_process_is_refused_and_the_first_goes_on(workspace: Workspace)
         assert running.server.requests == 5
 
 
-def test_a_limit_keeps_some_of_every_level_and_is_a_run_of_its_own(copy: Workspace) -> None:
+def test_a_limit_keeps_some_of_every_level_and_is_a_run_of_its_own(copy):
     copy.out = copy.root / "few"
     assert copy.run("--limit", "3", "--models", "oracle").code == 0
     records = copy.records()
@@ -164,7 +164,7 @@ def test_a_limit_keeps_some_of_every_level_and_is_a_run_of_its_own(copy: Workspa
     assert "found: different: limit" in other.err
 
 
-def test_what_does_not_change_results_does_not_make_another_run(copy: Workspace) -> None:
+def test_what_does_not_change_results_does_not_make_another_run(copy):
     labels = {"size_b": 7, "published": "GPT-4o", "price": {"input": 1.0, "output": 2.0}}
     copy.write_models("http://127.0.0.1:9", "alpha", transport="litellm", **labels)
     sets = ("--set", "limits.max_concurrency=1", "--set", "description=x")
@@ -174,9 +174,7 @@ def test_what_does_not_change_results_does_not_make_another_run(copy: Workspace)
 
 
 @pytest.mark.parametrize("order", ["file", "shuffled"])
-def test_more_models_and_seeds_go_on_in_the_folder_and_fewer_select_from_it(
-    workspace: Workspace, order: str
-) -> None:
+def test_more_models_and_seeds_go_on_in_the_folder_and_fewer_select_from_it(workspace, order):
     workspace.write_scenes()
     workspace.write_suite(models=["random"], seeds=[1, 0], candidates={"order": order})
     first = workspace.run()
@@ -200,7 +198,7 @@ def test_more_models_and_seeds_go_on_in_the_folder_and_fewer_select_from_it(
     assert workspace.tables() == whole
 
 
-def test_a_model_that_is_asked_otherwise_makes_another_run(copy: Workspace) -> None:
+def test_a_model_that_is_asked_otherwise_makes_another_run(copy):
     copy.write_models("http://127.0.0.1:9", "alpha", temperature=0.5)
     assert copy.run("--models", "oracle").code == 0
     done = copy.run("--models", "alpha")
@@ -208,7 +206,7 @@ def test_a_model_that_is_asked_otherwise_makes_another_run(copy: Workspace) -> N
     assert "found: different: models.alpha.params" in done.err
 
 
-def test_a_folder_that_holds_no_record_is_free_for_the_mended_suite(workspace: Workspace) -> None:
+def test_a_folder_that_holds_no_record_is_free_for_the_mended_suite(workspace):
     template = workspace.root / "mine.j2"
     template.write_text("{% block user %}{{ wrong }}{% endblock %}", encoding="utf-8")
     with Running(OpenAIChat()) as running:
@@ -221,9 +219,7 @@ def test_a_folder_that_holds_no_record_is_free_for_the_mended_suite(workspace: W
 
 
 @pytest.mark.parametrize("track", ["full_planning", "step_planning"])
-def test_baselines_need_no_replies_kept_and_nothing_is_drawn_for_them(
-    workspace: Workspace, track: str
-) -> None:
+def test_baselines_need_no_replies_kept_and_nothing_is_drawn_for_them(workspace, track):
     (workspace.cache / "replies.sqlite").mkdir()
     (workspace.cache / "pictures").unlink()
     workspace.write_suite(models=["random", "oracle"], tracks=[track])
@@ -240,13 +236,13 @@ def test_baselines_need_no_replies_kept_and_nothing_is_drawn_for_them(
 
 
 @pytest.mark.parametrize("text", ["", "0", "two", "-1", "1.5", "1" * 7, "²"])
-def test_what_is_no_version_is_refused(tmp_path: Path, text: str) -> None:
+def test_what_is_no_version_is_refused(tmp_path, text):
     (tmp_path / VERSION_FILE).write_text(text, encoding="utf-8")
     with pytest.raises(DataError, match=r"VERSION: holds no version\n.*\n.*whole number from 1"):
         read_version(tmp_path)
 
 
-def test_runs_on_two_versions_are_not_mixed(tmp_path: Path) -> None:
+def test_runs_on_two_versions_are_not_mixed(tmp_path):
     work = Workspace(tmp_path, tmp_path / "pictures")
     folder = work.write_scenes()
     work.write_suite(levels=[1])
@@ -265,13 +261,13 @@ def test_runs_on_two_versions_are_not_mixed(tmp_path: Path) -> None:
         compare_runs(load_run(work.out), load_run(newer), ["oracle"])
 
 
-def test_answers_to_two_versions_of_questions_are_not_mixed() -> None:
+def test_answers_to_two_versions_of_questions_are_not_mixed():
     runs = [run_of([], manifest(tracks={"vqa": {"questions": digest}})) for digest in "ab"]
     with pytest.raises(SpecError, match=r"tracks.vqa.questions: cannot be .*\n.*found: b"):
         check_pair(runs[1], runs[0], [], "vqa", Headline(runs[0], "vqa").measure)
 
 
-def test_a_record_is_one_line_of_json_whatever_the_reply_holds(workspace: Workspace) -> None:
+def test_a_record_is_one_line_of_json_whatever_the_reply_holds(workspace):
     text = "Step1: Move block with index 1\n\u2028\x85\r\0\ud800 ￿ 😀"
     with Running(OpenAIChat(say=lambda _: text)) as running:
         workspace.write_models(running.url, "alpha")
@@ -286,7 +282,7 @@ def test_a_record_is_one_line_of_json_whatever_the_reply_holds(workspace: Worksp
     assert all("😀" in json.loads(line)["reply"]["text"] for line in lines)
 
 
-def test_scores_can_be_made_where_the_data_set_has_moved(copy: Workspace) -> None:
+def test_scores_can_be_made_where_the_data_set_has_moved(copy):
     shutil.move(copy.root / "data", copy.root / "moved")
     manifest = copy.out / "run.yaml"
     lost = manifest.read_text(encoding="utf-8").replace("root: ", "root: /nowhere")

@@ -91,8 +91,8 @@ def newest(workspace: Workspace, folder: str) -> dict[str, Raw]:
 
 
 def test_it_is_refused_until_it_is_scored_and_then_ends_as_if_today_had_begun_it(
-    begun: Stopping, workspace: Workspace, capsys: pytest.CaptureFixture[str]
-) -> None:
+    begun, workspace, capsys
+):
     before, earlier = newest(workspace, "out"), read_manifest(workspace.out)
     files = workspace.files()
     for args in ((), ("--dry-run",)):
@@ -124,8 +124,8 @@ def test_it_is_refused_until_it_is_scored_and_then_ends_as_if_today_had_begun_it
 
 @pytest.mark.usefixtures("begun")
 def test_a_kill_before_either_file_is_replaced_processes_and_shards_end_in_the_same_records(
-    workspace: Workspace, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    workspace, monkeypatch
+):
     def records(name: str) -> bytes:
         return (workspace.root / name / "records.jsonl").read_bytes()
 

@@ -40,7 +40,7 @@ WAYS: list[tuple[str, str, str, type[LocalServer]]] = [
 
 
 def config_of(model_id: str, transport: str = "auto") -> ModelConfig:
-    spec = ModelConfig(id=model_id, api_key_env="PHYBLOCK_TEST_KEY", transport=transport)  # type: ignore[arg-type]
+    spec = ModelConfig(id=model_id, api_key_env="PHYBLOCK_TEST_KEY", transport=transport)
     return to_config("m", spec, Suite(name="s", models=("m",)))
 
 
@@ -53,12 +53,8 @@ def _environment(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.parametrize(("variable", "model_id", "path", "server"), WAYS)
 def test_calls_go_to_the_address_and_keys_say_that_there_is_one(
-    monkeypatch: pytest.MonkeyPatch,
-    variable: str,
-    model_id: str,
-    path: str,
-    server: type[LocalServer],
-) -> None:
+    monkeypatch, variable, model_id, path, server
+):
     keys = {reply_key(config_of(model_id), make_request())}
     with Running(server()) as running:
         monkeypatch.setenv(variable, running.url + path)
@@ -104,7 +100,7 @@ def everything(workspace: Workspace) -> dict[str, bytes]:
 
 
 @pytest.mark.parametrize("transport", ["direct", pytest.param("litellm", marks=pytest.mark.slow)])
-def test_keys_and_pictures_stay_off_the_disk(workspace: Workspace, transport: str) -> None:
+def test_keys_and_pictures_stay_off_the_disk(workspace, transport):
     others = tuple((f"echo-key-{kind}", 0.04) for kind in ("in-reply", "json", "cut", "page"))
     faults = Faults(0.1, 0.1, malformed=0.1, retry_after="0", others=others)
     kinds = {"talks": faults, "locked": Faults(mode="echo-key"), "refuses": Faults(mode="400")}
@@ -147,7 +143,7 @@ def test_keys_and_pictures_stay_off_the_disk(workspace: Workspace, transport: st
         assert b"IHDR" not in content, name
 
 
-def test_a_check_asks_every_server(workspace: Workspace) -> None:
+def test_a_check_asks_every_server(workspace):
     with Running(OpenAIChat()) as server:
         bases = [f"{server.url}/v1", "http://127.0.0.1:9/v1"]
         workspace.write_yaml("models.yaml", {"m": {"id": "hosted_vllm/m", "api_base": bases}})

@@ -78,9 +78,7 @@ def rules(record: Raw) -> set[str | None]:
     return {parse["rule"] for parse in parses}
 
 
-def test_all_tracks_ask_and_read_by_the_schema(
-    asked: tuple[Workspace, list[Seen]], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_all_tracks_ask_and_read_by_the_schema(asked, capsys):
     workspace, seen = asked
     for one in seen:
         sent = one.params.get("response_format")
@@ -178,7 +176,7 @@ def shown(seen: Seen) -> list[tuple[str, str]]:
     return [(str(caption), picture[1]) for caption, picture in pairs]
 
 
-def test_pictures_arrive_in_order_each_with_its_caption(workspace: Workspace) -> None:
+def test_pictures_arrive_in_order_each_with_its_caption(workspace):
     server = OpenAIChat(say=a_cube)
     done = run_with(workspace, server, subtasks=FEW_QUESTIONS, per_subtask=2)
     assert (done.code, done.err) == (0, "")
@@ -206,7 +204,7 @@ def test_pictures_arrive_in_order_each_with_its_caption(workspace: Workspace) ->
         assert record["outcome"] == ("parse_failure" if question.subtask == "OR" else "ok")
 
 
-def test_pictures_of_official_files_are_sent_byte_for_byte(workspace: Workspace) -> None:
+def test_pictures_of_official_files_are_sent_byte_for_byte(workspace):
     folder = workspace.root / "questions"
     folder.mkdir()
     entry = {
@@ -238,9 +236,7 @@ def test_pictures_of_official_files_are_sent_byte_for_byte(workspace: Workspace)
     assert right == set(LETTERS)
 
 
-def test_circular_and_blind_a_question_counts_once_and_only_if_all_rotations_are_right(
-    workspace: Workspace,
-) -> None:
+def test_circular_and_blind_a_question_counts_once_and_only_if_all_rotations_are_right(workspace):
     server = OpenAIChat(say=a_cube)
     done = run_with(
         workspace, server, circular=True, blind=True, subtasks=["SH", "CO"], per_subtask=3
@@ -304,7 +300,7 @@ def by_sample(records: list[dict[str, Any]]) -> dict[str, Any]:
     return {record["sample"]: stable(record) for record in records}
 
 
-def test_the_server_sees_goal_candidates_current_picture_and_history(workspace: Workspace) -> None:
+def test_the_server_sees_goal_candidates_current_picture_and_history(workspace):
     with Running(StepAgent()) as running:
         prepare(workspace, running.url)
         assert workspace.run().code == 0
@@ -335,7 +331,7 @@ def test_the_server_sees_goal_candidates_current_picture_and_history(workspace: 
         assert len(set(current.values())) == len(current)
 
 
-def test_faults_change_nothing(workspace: Workspace) -> None:
+def test_faults_change_nothing(workspace):
     found = []
     for faults in (Faults(), ISSUE_MIX):
         with Running(StepAgent(Faults(**{**vars(faults), "retry_after": "0"}))) as running:
@@ -375,9 +371,7 @@ def unsteady_scene() -> Raw:
 
 
 @pytest.mark.skipif(len(installed_engines()) < 2, reason="one engine is installed")
-def test_runs_in_two_engines_are_scored_anywhere_and_never_compared(
-    inside: Workspace, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_runs_in_two_engines_are_scored_anywhere_and_never_compared(inside, monkeypatch):
     """Falls are read from the records, whichever engine is here now."""
     workspace = inside
     workspace.write_scenes(unsteady_scene())
@@ -403,9 +397,7 @@ def test_runs_in_two_engines_are_scored_anywhere_and_never_compared(
 
 
 @pytest.mark.parametrize(("mode", "outcome"), [("length", "truncated"), ("filtered", "refusal")])
-def test_an_episode_of_which_no_reply_is_whole_is_no_parse_failure(
-    workspace: Workspace, mode: str, outcome: str
-) -> None:
+def test_an_episode_of_which_no_reply_is_whole_is_no_parse_failure(workspace, mode, outcome):
     with Running(StepAgent(Faults(mode=mode))) as running:
         prepare(workspace, running.url)
         assert workspace.run(*FEW).code == 0

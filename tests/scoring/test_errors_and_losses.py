@@ -56,9 +56,7 @@ def true_of(case: Case, setting: Setting, index: int, placed: set[int]) -> Error
 @pytest.mark.parametrize("matcher", MATCHERS)
 @pytest.mark.parametrize("setting", SETTINGS)
 @given(case=cases(max_blocks=8, max_steps=12))
-def test_each_wrong_step_has_exactly_the_one_type_that_holds(
-    setting: Setting, matcher: Matcher, case: Case
-) -> None:
+def test_each_wrong_step_has_exactly_the_one_type_that_holds(setting, matcher, case):
     match = match_plan(Goal(case.scene, case.candidates, setting), case.plan, matcher)
     errors = errors_of(case, setting, matcher)
     placed: set[int] = set()
@@ -75,9 +73,7 @@ def test_each_wrong_step_has_exactly_the_one_type_that_holds(
 
 @pytest.mark.parametrize("setting", SETTINGS)
 @given(case=st.one_of(cases(max_blocks=7, max_steps=10), carriers()), data=st.data())
-def test_file_order_of_blocks_changes_no_type_under_optimal(
-    setting: Setting, case: Case, data: st.DataObject
-) -> None:
+def test_file_order_of_blocks_changes_no_type_under_optimal(setting, case, data):
     blocks = tuple(data.draw(st.permutations(case.scene.blocks)))
     shuffled = replace(case, scene=replace(case.scene, blocks=blocks))
     assert count_errors(errors_of(shuffled, setting, "optimal")) == count_errors(
@@ -86,7 +82,7 @@ def test_file_order_of_blocks_changes_no_type_under_optimal(
 
 
 @pytest.mark.parametrize("first", [0, 1])
-def test_of_choices_alike_the_one_with_the_lightest_types_is_taken(first: int) -> None:
+def test_of_choices_alike_the_one_with_the_lightest_types_is_taken(first):
     # Either cube can be the one that is named, and then either arch stands; only if the turned
     # one does is the flat one, at its second naming, in no other pose than the one that is left.
     position = (0.0, 0.0, 0.0)
@@ -155,9 +151,7 @@ def standing(case: Case, setting: Setting, spare: Counter[object]) -> int:
 
 @each_setting
 @given(case=cases())
-def test_blocks_lost_are_what_each_kinder_reading_of_the_plan_wins(
-    setting: Setting, case: Case
-) -> None:
+def test_blocks_lost_are_what_each_kinder_reading_of_the_plan_wins(setting, case):
     counted = outcomes(case, setting)
     assert tuple(sorted(counted)) == tuple(sorted(BLOCK_OUTCOMES))
     assert min(counted.values()) >= 0
@@ -173,7 +167,7 @@ def test_blocks_lost_are_what_each_kinder_reading_of_the_plan_wins(
 
 @each_setting
 @given(case=cases(max_blocks=5))
-def test_missing_supports_have_the_cause_that_would_mend_them(setting: Setting, case: Case) -> None:
+def test_missing_supports_have_the_cause_that_would_mend_them(setting, case):
     counted = outcomes(case, setting)
     blocks = Counter(block.kind for block in case.scene.blocks)
     steps = Counter(case.candidates[index].kind for index in case.plan.steps)
@@ -205,9 +199,7 @@ def distinct_cases(draw: st.DrawFn) -> Case:
 
 
 @given(case=distinct_cases())
-def test_where_no_two_blocks_are_of_a_kind_each_has_the_outcome_that_its_own_story_gives(
-    case: Case,
-) -> None:
+def test_where_no_two_blocks_are_of_a_kind_each_has_the_outcome_that_its_own_story_gives(case):
     named = {case.candidates[index].look for index in case.plan.steps}
     kinds = {look[:2] for look in named}
     blocks = {block.order: block for block in case.scene.blocks}
@@ -240,9 +232,7 @@ def test_where_no_two_blocks_are_of_a_kind_each_has_the_outcome_that_its_own_sto
 
 @each_setting
 @given(case=cases(max_blocks=8), seed=st.integers(0, 2**32 - 1))
-def test_a_valid_order_places_all_and_an_empty_plan_leaves_all_out(
-    setting: Setting, case: Case, seed: int
-) -> None:
+def test_a_valid_order_places_all_and_an_empty_plan_leaves_all_out(setting, case, seed):
     scene = case.scene
     looks = {
         block.look: Candidate(block.type, block.color, block.euler_deg) for block in scene.blocks
@@ -260,9 +250,7 @@ def test_a_valid_order_places_all_and_an_empty_plan_leaves_all_out(
 
 @each_setting
 @given(case=cases(max_blocks=7, max_steps=10), data=st.data())
-def test_file_order_and_numbering_change_neither(
-    setting: Setting, case: Case, data: st.DataObject
-) -> None:
+def test_file_order_and_numbering_change_neither(setting, case, data):
     shuffled = renumbered(case, data)
     assert outcomes(shuffled, setting) == outcomes(case, setting)
     assert kept(shuffled, setting) == kept(case, setting)
@@ -281,9 +269,7 @@ def common(plan: tuple[int, ...], case: Case, order: tuple[int, ...], setting: S
 
 @each_setting
 @given(case=cases(max_blocks=5, max_steps=7))
-def test_steps_kept_are_those_common_with_the_nearest_of_all_valid_orders(
-    setting: Setting, case: Case
-) -> None:
+def test_steps_kept_are_those_common_with_the_nearest_of_all_valid_orders(setting, case):
     graph = case.scene.graph
     orders = filter(graph.is_valid, permutations(range(len(graph))))
     most = max(common(case.plan.steps, case, order, setting) for order in orders)
@@ -294,7 +280,7 @@ def test_steps_kept_are_those_common_with_the_nearest_of_all_valid_orders(
     assert most <= level1_counts(goal, case.plan, "selection").tp
 
 
-def test_a_step_that_is_no_candidate_is_refused() -> None:
+def test_a_step_that_is_no_candidate_is_refused():
     scene = Scene("s", (3,), (Block(1, "arch", "red", FLAT, FLAT, (), 1),), ("s",))
     goal, plan = Goal(scene, CandidateSet((Candidate("arch", "red", FLAT),)), "A"), Plan((1, 2))
     asked: list[Callable[[], object]] = [

@@ -44,9 +44,7 @@ def scored(
             yield row, (level, counts.tp, counts.fp, counts.fn)
 
 
-def test_known_counts_match_row_for_row(
-    official_dir: Path, official_checkout: Path, tasks: dict[str, AssemblyTask]
-) -> None:
+def test_known_counts_match_row_for_row(official_dir, official_checkout, tasks):
     path = official_dir / "expected" / "assembly_counts.csv"
     with path.open(encoding="utf-8", newline="") as file:
         expected = {
@@ -80,7 +78,7 @@ def assert_every_order_scores_1(task: AssemblyTask, rng: np.random.Generator) ->
 
 
 @EVERY
-def test_valid_orders_of_the_official_scenes_score_1(official_checkout: Path, every: int) -> None:
+def test_valid_orders_of_the_official_scenes_score_1(official_checkout, every):
     rng = np.random.default_rng(0)
     for task in official_tasks(official_checkout)[::every]:
         assert_every_order_scores_1(task, rng)
@@ -88,7 +86,7 @@ def test_valid_orders_of_the_official_scenes_score_1(official_checkout: Path, ev
 
 @EVERY
 @pytest.mark.parametrize("path", BUNDLED, ids=lambda path: path.parent.name)
-def test_valid_orders_of_the_bundled_scenes_score_1(path: Path, every: int) -> None:
+def test_valid_orders_of_the_bundled_scenes_score_1(path, every):
     rng = np.random.default_rng(0)
     for task in read_builtin(path.parent).tasks[::every]:
         assert_every_order_scores_1(task, rng)
@@ -113,14 +111,14 @@ def published() -> dict[str, dict[tuple[str, str], float]]:
     }
 
 
-def test_every_published_category_average_is_the_mean_of_its_four_subtasks() -> None:
+def test_every_published_category_average_is_the_mean_of_its_four_subtasks():
     for model, cells in published().items():
         for category, subtasks in CATEGORIES.items():
             mean = sum(cells[category, subtask] for subtask in subtasks) / len(subtasks)
             assert abs(mean - cells[category, "average"]) <= ROUNDING, (model, category)
 
 
-def test_the_published_overall_is_the_mean_of_the_categories_but_in_five_rows() -> None:
+def test_the_published_overall_is_the_mean_of_the_categories_but_in_five_rows():
     others = {}
     for model, cells in published().items():
         mean = sum(cells[category, "average"] for category in CATEGORIES) / len(CATEGORIES)
@@ -129,7 +127,7 @@ def test_the_published_overall_is_the_mean_of_the_categories_but_in_five_rows() 
     assert others == pytest.approx(OTHERWISE_AVERAGED)
 
 
-def test_chance_of_an_order_is_one_in_all_permutations() -> None:
+def test_chance_of_an_order_is_one_in_all_permutations():
     assert chance("SH") == 0.25
     assert chance("OR") == pytest.approx(1 / math.factorial(4))
     assert chance("VP", 2) == 0.5
@@ -137,9 +135,7 @@ def test_chance_of_an_order_is_one_in_all_permutations() -> None:
 
 @pytest.mark.parametrize("share", [0.2, pytest.param(1, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("parser", get_args(PlanParser))
-def test_optimal_is_never_below_paper_on_recorded_replies(
-    official_checkout: Path, tasks: dict[str, AssemblyTask], parser: PlanParser, share: float
-) -> None:
+def test_optimal_is_never_below_paper_on_recorded_replies(official_checkout, tasks, parser, share):
     goals = {
         (name, setting): Goal(task.scene, task.candidates, setting)
         for name, task in tasks.items()

@@ -36,9 +36,7 @@ def counted(case: Case, setting: Setting, matcher: Matcher = "optimal") -> Count
 
 @each_setting
 @given(case=cases(max_blocks=8, max_steps=12) | carriers())
-def test_optimal_is_the_best_of_all_sequences_of_choices_and_paper_is_algorithm_1(
-    setting: Setting, case: Case
-) -> None:
+def test_optimal_is_the_best_of_all_sequences_of_choices_and_paper_is_algorithm_1(setting, case):
     """The counts follow: B is never below A, nor optimal below paper, whatever the file order."""
     steps, blocks = len(case.plan), len(case.scene)
     greatest, greedy = greatest_tp(case, setting), greedy_tp(case, setting)
@@ -50,9 +48,7 @@ def test_optimal_is_the_best_of_all_sequences_of_choices_and_paper_is_algorithm_
 @each_matcher
 @each_setting
 @given(case=cases(max_blocks=8, max_steps=12))
-def test_every_step_places_a_ready_equal_block_or_could_not(
-    setting: Setting, matcher: Matcher, case: Case
-) -> None:
+def test_every_step_places_a_ready_equal_block_or_could_not(setting, matcher, case):
     match = matched(case, setting, matcher)
     placed: frozenset[int] = frozenset()
     for index, vertex, mask in zip(case.plan.steps, match.vertices, match.placed, strict=True):
@@ -69,10 +65,10 @@ def test_every_step_places_a_ready_equal_block_or_could_not(
 
 @each_setting
 @given(case=cases(max_blocks=8), seed=st.integers(0, 2**32 - 1))
-def test_every_valid_order_scores_1(setting: Setting, case: Case, seed: int) -> None:
+def test_every_valid_order_scores_1(setting, case, seed):
     scene = case.scene
     looks = {block.look: block for block in scene.blocks}
-    candidates = CandidateSet(tuple(looks.values()))  # type: ignore[arg-type]
+    candidates = CandidateSet(tuple(looks.values()))
     order = scene.graph.random_order(np.random.default_rng(seed))
     steps = [candidates.index_of(scene.blocks[vertex].look) for vertex in order]
     assert None not in steps
@@ -90,7 +86,7 @@ def level1(case: Case, setting: Setting, criterion: Level1Criterion) -> Counts:
 
 @each_setting
 @given(case=cases())
-def test_selection_is_a_one_to_one_matching_without_order(setting: Setting, case: Case) -> None:
+def test_selection_is_a_one_to_one_matching_without_order(setting, case):
     left = list(case.scene.blocks)
     for index in case.plan.steps:
         hit = next((b for b in left if equal(b, case.candidates[index], setting)), None)
@@ -102,7 +98,7 @@ def test_selection_is_a_one_to_one_matching_without_order(setting: Setting, case
 
 @each_setting
 @given(case=cases())
-def test_membership_counts_every_step_whose_block_occurs(setting: Setting, case: Case) -> None:
+def test_membership_counts_every_step_whose_block_occurs(setting, case):
     tp = sum(
         any(equal(block, case.candidates[index], setting) for block in case.scene.blocks)
         for index in case.plan.steps
@@ -112,9 +108,7 @@ def test_membership_counts_every_step_whose_block_occurs(setting: Setting, case:
 
 
 @given(counts=st.lists(COUNTS, max_size=8), data=st.data())
-def test_micro_averages_sum_first_whatever_the_order(
-    counts: list[Counts], data: st.DataObject
-) -> None:
+def test_micro_averages_sum_first_whatever_the_order(counts, data):
     total = sum(counts, Counts())
     assert total == Counts(*(sum(getattr(c, name) for c in counts) for name in ("tp", "fp", "fn")))
     assert sum(data.draw(st.permutations(counts)), Counts()) == total
@@ -124,7 +118,7 @@ def test_micro_averages_sum_first_whatever_the_order(
 
 @given(counts=COUNTS)
 @example(counts=Counts())
-def test_f1_is_the_harmonic_mean_of_precision_and_recall(counts: Counts) -> None:
+def test_f1_is_the_harmonic_mean_of_precision_and_recall(counts):
     tp, fp, fn = counts.tp, counts.fp, counts.fn
     precision = Fraction(tp, tp + fp) if tp + fp else None
     recall = Fraction(tp, tp + fn) if tp + fn else None
@@ -136,7 +130,7 @@ def test_f1_is_the_harmonic_mean_of_precision_and_recall(counts: Counts) -> None
 
 
 @given(case=cases(), level1=st.sampled_from([None, *LEVEL1_CRITERIA]))
-def test_the_scorer_says_what_its_parts_say(case: Case, level1: Level1Criterion | None) -> None:
+def test_the_scorer_says_what_its_parts_say(case, level1):
     scores = AssemblyScorer(case.scene, case.candidates, SETTINGS).score(
         case.plan, MATCHERS, level1
     )
@@ -165,7 +159,7 @@ def test_the_scorer_says_what_its_parts_say(case: Case, level1: Level1Criterion 
 
 
 @given(case=cases(), data=st.data())
-def test_what_was_scored_before_changes_nothing(case: Case, data: st.DataObject) -> None:
+def test_what_was_scored_before_changes_nothing(case, data):
     steps = st.lists(st.integers(1, len(case.candidates)), max_size=8)
     plans = [Plan(tuple(found)) for found in data.draw(st.lists(steps, max_size=4))]
     scorer = AssemblyScorer(case.scene, case.candidates, SETTINGS)

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import replace
-from random import Random
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.optimize import linear_sum_assignment  # type: ignore[import-untyped]
+from scipy.optimize import linear_sum_assignment
 from scipy.spatial.transform import Rotation
 
 from phyblock.domain.blocks import (
@@ -90,9 +89,7 @@ def summary(score: PoseScore) -> tuple[object, ...]:
 
 @settings(max_examples=20, deadline=None)
 @given(scenes(), st.integers(0, 99))
-def test_a_valid_order_at_true_poses_is_wholly_right(
-    drawn: tuple[Scene, CandidateSet], seed: int
-) -> None:
+def test_a_valid_order_at_true_poses_is_wholly_right(drawn, seed):
     scene, candidates = drawn
     order = scene.graph.random_order(np.random.default_rng(seed))
     for score in PoseScorer(scene, candidates, pieces).score(laid(scene, candidates, list(order))):
@@ -103,8 +100,8 @@ def test_a_valid_order_at_true_poses_is_wholly_right(
 @settings(max_examples=20, deadline=None)
 @given(scenes(), st.integers(0, 99), st.sampled_from([0.002, 0.01, 0.04]), st.data())
 def test_no_more_steps_are_right_than_without_poses_and_wider_tolerances_lose_none(
-    drawn: tuple[Scene, CandidateSet], seed: int, sigma_m: float, data: st.DataObject
-) -> None:
+    drawn, seed, sigma_m, data
+):
     scene, candidates = drawn
     vertices = data.draw(st.lists(st.integers(0, len(scene) - 1), max_size=7))
     steps = noisy(laid(scene, candidates, vertices), np.random.default_rng(seed), sigma_m)
@@ -125,12 +122,8 @@ def test_no_more_steps_are_right_than_without_poses_and_wider_tolerances_lose_no
     st.tuples(st.floats(-0.8, 0.8), st.floats(-0.8, 0.8)),
 )
 def test_aligned_does_not_change_when_the_whole_plan_is_shifted_and_turned(
-    drawn: tuple[Scene, CandidateSet],
-    seed: int,
-    sigma_m: float,
-    angle_deg: float,
-    shift_m: tuple[float, float],
-) -> None:
+    drawn, seed, sigma_m, angle_deg, shift_m
+):
     """Meters away none stands where it should: what is aligned there is what was sought."""
     scene, candidates = drawn
     rng = np.random.default_rng(seed)
@@ -148,9 +141,7 @@ def test_aligned_does_not_change_when_the_whole_plan_is_shifted_and_turned(
 
 @settings(max_examples=40, deadline=None)
 @given(scenes(), st.randoms(use_true_random=False), st.sampled_from([0.005, 0.015, 0.03]))
-def test_the_best_motion_of_a_plan_is_no_worse_than_none(
-    drawn: tuple[Scene, CandidateSet], random: Random, sigma_m: float
-) -> None:
+def test_the_best_motion_of_a_plan_is_no_worse_than_none(drawn, random, sigma_m):
     """Also where steps come in an order that is not valid, or some are anywhere."""
     scene, candidates = drawn
     order = random.choices(range(len(scene)), k=random.randint(1, len(scene)))
@@ -165,9 +156,7 @@ def test_the_best_motion_of_a_plan_is_no_worse_than_none(
 
 @settings(max_examples=20, deadline=None)
 @given(scenes(), st.integers(0, 99), st.data())
-def test_symmetries_and_the_order_of_equal_blocks_in_the_file_change_nothing(
-    drawn: tuple[Scene, CandidateSet], seed: int, data: st.DataObject
-) -> None:
+def test_symmetries_and_the_order_of_equal_blocks_in_the_file_change_nothing(drawn, seed, data):
     scene, candidates = drawn
     rng = np.random.default_rng(seed)
     steps = noisy(laid(scene, candidates, list(scene.graph.random_order(rng))), rng, 0.012)
@@ -186,7 +175,7 @@ def test_symmetries_and_the_order_of_equal_blocks_in_the_file_change_nothing(
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_a_goal_that_looks_the_same_after_half_a_turn_is_met_whichever_way(seed: int) -> None:
+def test_a_goal_that_looks_the_same_after_half_a_turn_is_met_whichever_way(seed):
     one, two = (
         Block(n, "cube", "red", (0.0, y, 0.0), (0.0, 0.0, 0.0), depend, 1)
         for n, y, depend in ((1, 0.0, ()), (2, 0.025, (1,)))
@@ -202,7 +191,7 @@ def test_a_goal_that_looks_the_same_after_half_a_turn_is_met_whichever_way(seed:
 
 
 @given(st.integers(1, 9), st.integers(1, 9), st.integers(0, 9999))
-def test_assignments_are_as_cheap_as_those_of_scipy(rows: int, columns: int, seed: int) -> None:
+def test_assignments_are_as_cheap_as_those_of_scipy(rows, columns, seed):
     cost = np.round(np.random.default_rng(seed).uniform(0, 4, (rows, columns)), 1)
     pairs = cheapest(cost)
     assert len({r for r, _ in pairs}) == len({c for _, c in pairs}) == min(rows, columns)
@@ -211,15 +200,13 @@ def test_assignments_are_as_cheap_as_those_of_scipy(rows: int, columns: int, see
 
 @settings(max_examples=60, deadline=None)
 @given(st.integers(1, 5), st.integers(1, 6), st.integers(0, 9999))
-def test_steps_are_matched_at_the_least_cost_of_all_valid_ways(
-    n_blocks: int, n_steps: int, seed: int
-) -> None:
+def test_steps_are_matched_at_the_least_cost_of_all_valid_ways(n_blocks, n_steps, seed):
     """Against every way there is."""
     rng = np.random.default_rng(seed)
     depend = [tuple(int(o) for o in range(1, v + 1) if rng.random() < 0.3) for v in range(n_blocks)]
     colors = [("red", "blue")[int(rng.integers(2))] for _ in range(n_blocks)]
     blocks = tuple(
-        Block(v + 1, "cube", colors[v], (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), depend[v], 1)  # type: ignore[arg-type]
+        Block(v + 1, "cube", colors[v], (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), depend[v], 1)
         for v in range(n_blocks)
     )
     scene = Scene("s", (2,), blocks, ("s",))
@@ -253,9 +240,7 @@ def valid(graph: AOVGraph, way: tuple[int | None, ...]) -> bool:
 
 
 @pytest.mark.parametrize("block_type", BLOCK_TYPES)
-def test_pieces_fill_their_block_and_its_symmetries_map_it_onto_itself(
-    block_type: BlockType,
-) -> None:
+def test_pieces_fill_their_block_and_its_symmetries_map_it_onto_itself(block_type):
     solid = pieces(block_type)
     for rotation in symmetries(block_type)[:6]:
         shared = overlap_volume(solid, placed(solid, rotation, np.zeros(3)))
@@ -265,9 +250,7 @@ def test_pieces_fill_their_block_and_its_symmetries_map_it_onto_itself(
 
 @settings(max_examples=20, deadline=None)
 @given(st.sampled_from(BLOCK_TYPES), st.sampled_from(BLOCK_TYPES), st.integers(0, 999))
-def test_shared_volumes_agree_with_points_drawn_at_random(
-    one: BlockType, other: BlockType, seed: int
-) -> None:
+def test_shared_volumes_agree_with_points_drawn_at_random(one, other, seed):
     rng = np.random.default_rng(seed)
     turn = euler_deg_to_matrix(tuple(rng.uniform(-180, 180, 3)))
     first, second = pieces(one), placed(pieces(other), turn, rng.uniform(-0.03, 0.03, 3))

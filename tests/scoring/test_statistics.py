@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 from collections import defaultdict
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from scipy import stats
-from scipy.special import gammaincinv  # type: ignore[import-untyped]
+from scipy.special import gammaincinv
 
 from phyblock.scoring.plan import Floats, f1_of, ratio_of
 from phyblock.scoring.statistics import (
@@ -56,9 +55,7 @@ def difference_of(sums: Floats) -> Floats:
 
 
 @given(MEMBERS, st.integers(0, 2**32 - 1))
-def test_the_variance_sums_over_all_pairs_that_have_a_base_scene_in_common(
-    parents: list[list[str]], seed: int
-) -> None:
+def test_the_variance_sums_over_all_pairs_that_have_a_base_scene_in_common(parents, seed):
     # Of a sum, leaving a group out changes it by the group: the formula can be written out.
     x = rng(seed).normal(size=len(parents))
     clusters = Clusters.of(parents)
@@ -73,7 +70,7 @@ def test_the_variance_sums_over_all_pairs_that_have_a_base_scene_in_common(
 
 
 @given(hnp.arrays(float, st.integers(2, 30), elements=st.floats(-1e3, 1e3, width=32)))
-def test_a_mean_of_lone_units_has_students_interval(x: np.ndarray) -> None:
+def test_a_mean_of_lone_units_has_students_interval(x):
     found = jackknife(np.stack([x, np.ones(len(x))], 1), alone(len(x)), mean_of)
     se = x.std(ddof=1) / np.sqrt(len(x))
     assert found.se == pytest.approx(se, abs=1e-9)
@@ -82,9 +79,7 @@ def test_a_mean_of_lone_units_has_students_interval(x: np.ndarray) -> None:
 
 
 @given(hnp.arrays(np.int64, (6, 3), elements=st.integers(0, 9)), st.integers(2, 5))
-def test_counts_a_whole_number_of_times_as_large_change_nothing(
-    counts: np.ndarray, times: int
-) -> None:
+def test_counts_a_whole_number_of_times_as_large_change_nothing(counts, times):
     for metric in (precision_of, recall_of, f1_of):
         once, often = (jackknife(counts * k, alone(6), metric) for k in (1, times))
         for name in ("value", "se", "lo", "hi", "p"):
@@ -93,7 +88,7 @@ def test_counts_a_whole_number_of_times_as_large_change_nothing(
 
 
 @given(hnp.arrays(np.int64, (8, 3), elements=st.integers(0, 9)))
-def test_the_interval_of_a_share_holds_it_and_stays_in_its_range(counts: np.ndarray) -> None:
+def test_the_interval_of_a_share_holds_it_and_stays_in_its_range(counts):
     found = in_range(jackknife(counts, alone(8), f1_of))
     if np.isnan(found.se):
         assert np.isnan([found.lo, found.hi, found.p]).all()
@@ -101,7 +96,7 @@ def test_the_interval_of_a_share_holds_it_and_stays_in_its_range(counts: np.ndar
         assert 0 <= found.lo <= found.value <= found.hi <= 1
 
 
-def test_a_difference_keeps_students_interval_beside_shares() -> None:
+def test_a_difference_keeps_students_interval_beside_shares():
     counts = np.stack(
         [np.array([[2, 5], [1, 5], [0, 5]]), np.array([[-2, 5], [-1, 5], [-4, 5]])], 1
     )
@@ -112,7 +107,7 @@ def test_a_difference_keeps_students_interval_beside_shares() -> None:
 
 
 @given(st.integers(2, 300), st.booleans())
-def test_none_of_n_and_all_of_n_have_wilsons_interval(n: int, is_right: bool) -> None:
+def test_none_of_n_and_all_of_n_have_wilsons_interval(n, is_right):
     found = in_range(jackknife([[int(is_right), 1]] * n, alone(n), ratio_of))
     assert found.hi > found.lo
     quantile = stats.t.ppf(0.975, n - 1) ** 2
@@ -121,7 +116,7 @@ def test_none_of_n_and_all_of_n_have_wilsons_interval(n: int, is_right: bool) ->
 
 
 @given(st.integers(1, 9), st.integers(10, 19), st.integers(2, 40), st.integers(2, 6))
-def test_scenes_that_agree_leave_a_share_in_doubt(part: int, whole: int, n: int, k: int) -> None:
+def test_scenes_that_agree_leave_a_share_in_doubt(part, whole, n, k):
     """As much as if each were one sample, also where scenes of several counts have the same."""
     counts = np.array([[part, whole]] * n)
     found = in_range(jackknife(counts * np.arange(1, n + 1)[:, None] ** k, alone(n), ratio_of))
@@ -138,7 +133,7 @@ def test_scenes_that_agree_leave_a_share_in_doubt(part: int, whole: int, n: int,
     hnp.arrays(float, st.integers(2, 12), elements=st.floats(0, 180, width=32)),
     st.sampled_from([180.0, 400.0, np.inf]),
 )
-def test_an_interval_stays_in_the_range_of_its_measure(x: np.ndarray, most: float) -> None:
+def test_an_interval_stays_in_the_range_of_its_measure(x, most):
     student = jackknife(np.stack([x, np.ones(len(x))], 1), alone(len(x)), mean_of)
     found = in_range(student, most)
     assert 0 <= found.lo <= found.value <= found.hi <= most
@@ -160,7 +155,7 @@ def test_an_interval_stays_in_the_range_of_its_measure(x: np.ndarray, most: floa
 
 
 @given(hnp.arrays(np.int64, (8, 3), elements=st.integers(0, 9)))
-def test_nothing_differs_from_itself(counts: np.ndarray) -> None:
+def test_nothing_differs_from_itself(counts):
     counts[0] = counts[1] = (1, 0, 0)
     pair = np.stack([counts, counts], axis=1)
     found = jackknife(pair, alone(8), difference_of)
@@ -168,7 +163,7 @@ def test_nothing_differs_from_itself(counts: np.ndarray) -> None:
 
 
 @given(st.integers(2, 12))
-def test_a_few_scenes_that_agree_leave_as_much_doubt_as_a_sign_test(n: int) -> None:
+def test_a_few_scenes_that_agree_leave_as_much_doubt_as_a_sign_test(n):
     counts = np.array([[[5, 0, 0], [0, 5, 5]]] * n)
     found = jackknife(counts, alone(n), difference_of)
     assert found.value == 1
@@ -176,7 +171,7 @@ def test_a_few_scenes_that_agree_leave_as_much_doubt_as_a_sign_test(n: int) -> N
 
 
 @given(st.floats(0.001, 10), st.integers(5, 200), st.sampled_from([0.05, 0.01, 0.001]))
-def test_what_is_detectable_is_found_in_four_of_five_cases(se: float, n: int, level: float) -> None:
+def test_what_is_detectable_is_found_in_four_of_five_cases(se, n, level):
     df = n - 1
     effect = float(detectable(se, n, level))
     # The estimate, less the effect, over its standard error, is Student's t.
@@ -185,7 +180,7 @@ def test_what_is_detectable_is_found_in_four_of_five_cases(se: float, n: int, le
 
 
 @given(st.integers(1, 7), st.data())
-def test_ranks_are_what_the_pairs_allow(n: int, data: st.DataObject) -> None:
+def test_ranks_are_what_the_pairs_allow(n, data):
     strength = data.draw(st.permutations(range(n)))
     sure = data.draw(hnp.arrays(bool, (n, n)))
     is_better = [[sure[a, b] and strength[a] > strength[b] for b in range(n)] for a in range(n)]
@@ -197,25 +192,25 @@ def test_ranks_are_what_the_pairs_allow(n: int, data: st.DataObject) -> None:
         assert (ranks[:, 0] == ranks[:, 1]).all()
 
 
-def test_no_interval_comes_from_a_single_base_scene() -> None:
+def test_no_interval_comes_from_a_single_base_scene():
     found = jackknife([[1, 1, 0]] * 4, Clusters.of([["a"]] * 4), f1_of)
     assert found.value == pytest.approx(2 / 3)
     assert all(np.isnan([found.se, found.lo, found.hi, found.p]))
     assert found.n_clusters == 1
 
 
-def test_nothing_measured_is_no_value() -> None:
+def test_nothing_measured_is_no_value():
     found = jackknife(np.zeros((0, 2, 3)), Clusters.of([]), f1_of)
     assert found.value.shape == (2,)
     assert np.isnan([found.value, found.se, found.lo, found.hi, found.p]).all()
 
 
-def test_a_unit_without_a_base_scene_is_refused() -> None:
+def test_a_unit_without_a_base_scene_is_refused():
     with pytest.raises(ValueError, match="needs a base scene"):
         Clusters.of([["a"], []])
 
 
-def test_macro_means_are_measured_anew_without_each_group() -> None:
+def test_macro_means_are_measured_anew_without_each_group():
     counts = np.zeros((40, 2, 2))
     counts[:30, 0] = [[n % 3 == 0, 1] for n in range(30)]
     counts[30:, 1] = [[1, 1]] * 10
@@ -224,13 +219,13 @@ def test_macro_means_are_measured_anew_without_each_group() -> None:
     assert found.se == pytest.approx(np.sqrt(1 / 3 * 2 / 3 / 30) / 2, rel=0.06)
 
 
-def test_holm_by_hand() -> None:
+def test_holm_by_hand():
     assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
     assert holm([0.6, np.nan, 0.7]) == pytest.approx([1, np.nan, 1], nan_ok=True)
 
 
 @given(P_VALUES)
-def test_holm_only_raises_and_keeps_the_order_and_the_least_is_bonferronis(p: np.ndarray) -> None:
+def test_holm_only_raises_and_keeps_the_order_and_the_least_is_bonferronis(p):
     corrected = holm(p)
     assert (corrected >= p).all()
     assert (np.diff(corrected[np.argsort(p, kind="stable")]) >= 0).all()
@@ -270,9 +265,7 @@ def official(official_dir: Path) -> tuple[dict[str, Floats], Clusters, Clusters]
     return counts, Clusters.of([s.parents for s in scenes]), alone(len(scenes))
 
 
-def test_recorded_scenes_of_common_origin_widen_the_naive_standard_error(
-    official: tuple[dict[str, Floats], Clusters, Clusters],
-) -> None:
+def test_recorded_scenes_of_common_origin_widen_the_naive_standard_error(official):
     counts, clusters, naive = official
     gpt_4o = counts["gpt-4o"]
     assert clusters.size == 150
@@ -282,9 +275,7 @@ def test_recorded_scenes_of_common_origin_widen_the_naive_standard_error(
     assert found == pytest.approx(dyadic_se(influence(gpt_4o), clusters), rel=0.03)
 
 
-def test_recorded_models_are_compared_in_pairs(
-    official: tuple[dict[str, Floats], Clusters, Clusters],
-) -> None:
+def test_recorded_models_are_compared_in_pairs(official):
     counts, clusters, _ = official
     pair = np.stack([counts["gpt-4o"], counts["gemini-2.0-flash"]], axis=1)
     found = jackknife(pair, clusters, difference_of)
@@ -307,7 +298,7 @@ WORLDS = [
 
 @pytest.mark.slow
 @pytest.mark.parametrize("world", WORLDS, ids=str)
-def test_intervals_hold_the_truth_and_tests_err_as_often_as_they_say(world: World) -> None:
+def test_intervals_hold_the_truth_and_tests_err_as_often_as_they_say(world):
     draw = rng(20261121)
     truth = world.true_f1(draw)
     n, covered, erred = 1000, 0, 0
@@ -337,9 +328,7 @@ def close(one: Component, other: Component, scale: float = 1.0) -> bool:
 
 @pytest.mark.parametrize("component", [shift, interaction])
 @given(seed=st.integers(0, 10**6))
-def test_what_belongs_to_items_and_blocks_is_no_work_of_levels(
-    component: Callable[..., Component], seed: int
-) -> None:
+def test_what_belongs_to_items_and_blocks_is_no_work_of_levels(component, seed):
     scores, rng = drawn(seed), np.random.default_rng(seed + 1)
     other = scores + rng.normal(size=(12, 1, 1)) + rng.normal(size=(1, 1, 4))
     assert close(component(scores, alone(12)), component(other, alone(12)))
@@ -347,14 +336,14 @@ def test_what_belongs_to_items_and_blocks_is_no_work_of_levels(
 
 
 @given(seed=st.integers(0, 10**6))
-def test_an_effect_alike_on_all_items_is_shift_alone(seed: int) -> None:
+def test_an_effect_alike_on_all_items_is_shift_alone(seed):
     scores = drawn(seed)
     moved = scores + np.array([0.0, 5.0, -1.0])[None, :, None]
     assert close(interaction(scores, alone(12)), interaction(moved, alone(12)))
     assert shift(moved, alone(12)).sd > shift(scores, alone(12)).sd
 
 
-def test_two_levels_are_half_their_squared_difference_less_its_error() -> None:
+def test_two_levels_are_half_their_squared_difference_less_its_error():
     scores = drawn(3)[:, :2]
     gap = (scores[:, 1] - scores[:, 0]).mean(axis=1)
     error = gap.var(ddof=1) / len(gap)
@@ -363,7 +352,7 @@ def test_two_levels_are_half_their_squared_difference_less_its_error() -> None:
     )
 
 
-def test_components_of_a_crossed_design_are_those_of_the_analysis_of_variance() -> None:
+def test_components_of_a_crossed_design_are_those_of_the_analysis_of_variance():
     """By the sums of squares of a textbook: items x levels x blocks, one score a cell."""
     y = drawn(5)
     n, levels, blocks = y.shape
@@ -379,7 +368,7 @@ def test_components_of_a_crossed_design_are_those_of_the_analysis_of_variance() 
     assert interaction(y, alone(n)).sd ** 2 == pytest.approx(expected)
 
 
-def test_known_components_lie_in_their_intervals() -> None:
+def test_known_components_lie_in_their_intervals():
     rng = np.random.default_rng(2)
     hits = dict.fromkeys(TRUTH, 0)
     squares = dict.fromkeys(TRUTH, 0.0)
@@ -404,7 +393,7 @@ def test_known_components_lie_in_their_intervals() -> None:
         assert np.sqrt(squares[name]) == pytest.approx(TRUTH[name], rel=0.15), name
 
 
-def test_scenes_that_agree_by_chance_are_no_certainty() -> None:
+def test_scenes_that_agree_by_chance_are_no_certainty():
     """The error is 0 where every scene says the same, but there are four scenes of each alone."""
     alike = np.tile(np.array([0.0, 1.0, 0.0, 1.0]), (4, 3, 1))
     spread = np.array([0.0, 1.0, 0.0, 1.0])[:, None] * np.ones((4, 3))
@@ -420,7 +409,7 @@ def test_scenes_that_agree_by_chance_are_no_certainty() -> None:
         assert np.allclose([part.lo, part.hi], ends)
 
 
-def test_nothing_to_tell_has_no_value() -> None:
+def test_nothing_to_tell_has_no_value():
     scores = drawn(1)
     assert np.isnan(interaction(scores[:, :, :1], alone(12)).sd)
     assert np.isnan(within(scores[:, :, :1], alone(12)).sd)

@@ -50,9 +50,7 @@ def assert_no_valid_order_fails(
         ("built-in", "A", "layer", 2),
     ],
 )
-def test_no_valid_order_fails(
-    source: str, setting: Setting, gating: Gating, orders: int, request: pytest.FixtureRequest
-) -> None:
+def test_no_valid_order_fails(source, setting, gating, orders, request):
     if source == "official":
         tasks = official_tasks(request.getfixturevalue("official_checkout"))
     else:
@@ -80,11 +78,9 @@ def right(case: Case, setting: Setting) -> list[int]:
 
 @settings(deadline=None)
 @given(cases(), any_setting, any_gating, st.randoms(use_true_random=False))
-def test_a_valid_order_never_fails_whatever_looks_alike(
-    case: Case, setting: Setting, gating: Gating, random: object
-) -> None:
+def test_a_valid_order_never_fails_whatever_looks_alike(case, setting, gating, random):
     numbers = right(case, setting)
-    rng = np.random.default_rng(random.getrandbits(32))  # type: ignore[attr-defined]
+    rng = np.random.default_rng(random.getrandbits(32))
     assembly = Assembly(case.scene, case.candidates, setting, gating)
     for vertex in gated(case.scene, gating).graph.random_order(rng):
         if numbers[vertex] == 0:
@@ -96,9 +92,7 @@ def test_a_valid_order_never_fails_whatever_looks_alike(
 
 @settings(deadline=None)
 @given(cases(max_steps=14), any_setting, any_gating)
-def test_the_world_is_always_one_that_can_be_built(
-    case: Case, setting: Setting, gating: Gating
-) -> None:
+def test_the_world_is_always_one_that_can_be_built(case, setting, gating):
     """Whatever is placed has all that it depends on, and the right moves are those that work."""
     assembly = Assembly(case.scene, case.candidates, setting, gating)
     graph = gated(case.scene, gating).graph
@@ -119,7 +113,7 @@ def test_the_world_is_always_one_that_can_be_built(
 
 @settings(deadline=None)
 @given(cases(max_steps=14), any_setting)
-def test_a_wrong_move_has_the_error_type_of_its_moment(case: Case, setting: Setting) -> None:
+def test_a_wrong_move_has_the_error_type_of_its_moment(case, setting):
     assembly = Assembly(case.scene, case.candidates, setting)
     for index in case.plan.steps:
         candidate = case.candidates[index]
@@ -137,7 +131,7 @@ def test_a_wrong_move_has_the_error_type_of_its_moment(case: Case, setting: Sett
 
 @settings(deadline=None)
 @given(cases(max_steps=14), any_setting)
-def test_no_more_is_placed_than_the_optimal_matcher_allows(case: Case, setting: Setting) -> None:
+def test_no_more_is_placed_than_the_optimal_matcher_allows(case, setting):
     assembly = Assembly(case.scene, case.candidates, setting)
     outcomes = [assembly.move(index).outcome for index in case.plan.steps]
     placed = Plan(tuple(assembly.chosen))
@@ -148,7 +142,7 @@ def test_no_more_is_placed_than_the_optimal_matcher_allows(case: Case, setting: 
 
 @settings(deadline=None)
 @given(cases(), st.integers(-(10**9), 10**9))
-def test_a_number_that_no_candidate_has_is_invalid(case: Case, index: int) -> None:
+def test_a_number_that_no_candidate_has_is_invalid(case, index):
     assembly = Assembly(case.scene, case.candidates, "A")
     outcome = assembly.move(index).outcome
     assert (outcome == "invalid") == (not 1 <= index <= len(case.candidates))
@@ -157,21 +151,19 @@ def test_a_number_that_no_candidate_has_is_invalid(case: Case, index: int) -> No
 
 def cube(order: int, color: str, depend: tuple[int, ...] = (), turn: float = 0.0) -> Block:
     layer = 1 + bool(depend)
-    return Block(order, "arch", color, (0, 0, 0), (0, 0, turn), depend, layer)  # type: ignore[arg-type]
+    return Block(order, "arch", color, (0, 0, 0), (0, 0, turn), depend, layer)
 
 
 def two_pillars() -> tuple[Scene, CandidateSet]:
     """Two equal red blocks; a blue one stands on the first, a green one on the second."""
     blocks = (cube(1, "red"), cube(2, "red"), cube(3, "blue", (1,)), cube(4, "green", (2,)))
     colors = ("red", "blue", "green", "yellow")
-    numbered = tuple(Candidate("arch", color, (0, 0, 0)) for color in colors)  # type: ignore[arg-type]
+    numbered = tuple(Candidate("arch", color, (0, 0, 0)) for color in colors)
     return Scene("pillars", (3,), blocks, ("pillars",)), CandidateSet(numbered)
 
 
 @pytest.mark.parametrize(("third", "standing"), [(2, (0, 2)), (3, (1, 3))])
-def test_equal_blocks_change_places_where_the_next_move_needs_it(
-    third: int, standing: tuple[int, ...]
-) -> None:
+def test_equal_blocks_change_places_where_the_next_move_needs_it(third, standing):
     """After one red block, blue and green are both right: the picture follows the choice."""
     assembly = Assembly(*two_pillars(), "A")
     assembly.move(1)
@@ -183,7 +175,7 @@ def test_equal_blocks_change_places_where_the_next_move_needs_it(
     assert assembly.move(5 - third).outcome == "dependency_not_met"
 
 
-def test_layers_wait_for_the_whole_layer_below() -> None:
+def test_layers_wait_for_the_whole_layer_below():
     scene, candidates = two_pillars()
     moves = (1, 2, 1, 2)
     outcomes = {
@@ -199,9 +191,7 @@ def test_layers_wait_for_the_whole_layer_below() -> None:
 
 @settings(deadline=None)
 @given(cases(max_steps=14), any_setting)
-def test_every_placed_block_is_right_under_the_setting_that_let_it(
-    case: Case, setting: Setting
-) -> None:
+def test_every_placed_block_is_right_under_the_setting_that_let_it(case, setting):
     assembly = Assembly(case.scene, case.candidates, setting)
     outcomes = [assembly.move(index).outcome for index in case.plan.steps]
     placed = placed_counts(case.scene, case.candidates, setting, assembly.chosen)

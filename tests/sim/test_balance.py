@@ -17,7 +17,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from phyblock.domain.blocks import SHAPES, BlockType
+from phyblock.domain.blocks import SHAPES
 from phyblock.domain.scene import Block
 from phyblock.sim import balance, certificate
 from phyblock.sim.balance import (
@@ -44,9 +44,7 @@ angles_deg = st.floats(0, 90)
 
 
 @given(offset_m=offsets_m, angle_deg=angles_deg)
-def test_a_cube_stands_on_another_as_far_as_its_middle_is_over_it(
-    offset_m: float, angle_deg: float
-) -> None:
+def test_a_cube_stands_on_another_as_far_as_its_middle_is_over_it(offset_m, angle_deg):
     pair = [block(1, "cube", (0, 0, 0.025)), block(2, "cube", (offset_m, 0, 0.075))]
     pair = turned(pair, angle_deg, (0.3, -0.2))
     inside_m = HALF_CUBE_M - abs(offset_m)
@@ -61,9 +59,7 @@ def test_a_cube_stands_on_another_as_far_as_its_middle_is_over_it(
     ("plank", "plank_m", "weight_m"),
     [("cuboid3", -0.0625, -0.025), ("cuboid2", 0.05, 0.0125), ("cuboid2", -0.0375, -0.05)],
 )
-def test_a_solver_that_says_too_little_is_left_over_bears_nothing(
-    plank: BlockType, plank_m: float, weight_m: float
-) -> None:
+def test_a_solver_that_says_too_little_is_left_over_bears_nothing(plank, plank_m, weight_m):
     """Each tips for sure, and least squares say that nothing is left over (scipy 1.15 to 1.17)."""
     tipping = [
         *tower(1),
@@ -89,7 +85,7 @@ def loaded_planks(draw: st.DrawFn) -> list[Block]:
 
 @settings(max_examples=40)
 @given(loaded_planks())
-def test_least_squares_and_linear_programming_agree(blocks: list[Block]) -> None:
+def test_least_squares_and_linear_programming_agree(blocks):
     def verdicts() -> tuple[bool, bool]:
         return is_balanced(blocks), surely_stands(blocks)
 
@@ -103,9 +99,7 @@ def test_least_squares_and_linear_programming_agree(blocks: list[Block]) -> None
 
 
 @given(loaded_planks(), st.floats(0, MARGIN_M), angles_deg.map(lambda a: 4 * a), st.floats(0, 1))
-def test_a_sure_verdict_holds_for_all_shifts_and_masses_between(
-    blocks: list[Block], radius_m: float, angle_deg: float, share: float
-) -> None:
+def test_a_sure_verdict_holds_for_all_shifts_and_masses_between(blocks, radius_m, angle_deg, share):
     angle, (light, heavy) = math.radians(angle_deg), balance.MASS_FACTORS
     shift_m = (radius_m * math.cos(angle), radius_m * math.sin(angle))
     factor = light + share * (heavy - light)
@@ -119,7 +113,7 @@ def test_a_sure_verdict_holds_for_all_shifts_and_masses_between(
 
 
 @pytest.mark.parametrize(("off_m", "falls"), [(0.002, False), (0.0035, False), (0.007, True)])
-def test_a_balance_nearer_than_the_margin_is_no_sure_fall(off_m: float, falls: bool) -> None:
+def test_a_balance_nearer_than_the_margin_is_no_sure_fall(off_m, falls):
     """On a ridge a slab balances at one place alone, which is on no ring round another."""
     ridge_m = 0.05 / 2**0.5
     ridge = [block(1, "triangle", (0, 0, 0)), block(2, "cuboid1", (off_m, off_m, ridge_m + 0.0125))]
@@ -127,9 +121,7 @@ def test_a_balance_nearer_than_the_margin_is_no_sure_fall(off_m: float, falls: b
 
 
 @given(st.floats(-0.01, 0.02), angles_deg)
-def test_a_plank_surely_stands_on_posts_that_it_covers_by_the_margin(
-    over_m: float, angle_deg: float
-) -> None:
+def test_a_plank_surely_stands_on_posts_that_it_covers_by_the_margin(over_m, angle_deg):
     """Its weight is always between the posts; it slips off them where it covers too little."""
     post_m = max(SHAPES["cuboid3"].high_m) + HALF_CUBE_M - over_m
     posts = [block(i, "cube", (0, y, 0.025)) for i, y in ((1, -post_m), (2, post_m))]
@@ -168,7 +160,7 @@ def stands_in(engine: str, blocks: Sequence[Block]) -> bool:
 @given(disturbed())
 @example([one for one in SCENES["l1-007-slide"] if one.order != 1])
 @example([one for one in SCENES["l2-032-slide"] if one.order != 1])
-def test_no_engine_contradicts_a_proof(blocks: list[Block]) -> None:
+def test_no_engine_contradicts_a_proof(blocks):
     for group in groups(blocks):
         proven = prove(group)
         assert proven is None or proven.stands or not is_balanced(group)
@@ -179,14 +171,14 @@ def test_no_engine_contradicts_a_proof(blocks: list[Block]) -> None:
 
 
 @pytest.mark.parametrize(("name", "stands"), [("l1-007-slide", False), ("l2-032-slide", True)])
-def test_a_wedge_on_two_ridges_surely_stands_where_it_covers_them(name: str, stands: bool) -> None:
+def test_a_wedge_on_two_ridges_surely_stands_where_it_covers_them(name, stands):
     """Its base ends over the ridges, and both engines drop it, or reaches 1 cm beyond them."""
     left = [one for one in SCENES[name] if one.order != 1]
     assert is_balanced(left)
     assert surely_stands(left) is stands
 
 
-def test_what_the_data_set_holds_stands() -> None:
+def test_what_the_data_set_holds_stands():
     for blocks in list(SCENES.values())[::80]:
         assert all(is_balanced(group) for group in groups(blocks))
 
@@ -214,7 +206,7 @@ def numbers(value: Any, path: tuple[int, ...] = ()) -> Iterator[tuple[int, ...]]
             yield from numbers(part, (*path, at))
 
 
-def test_a_proof_holds_for_what_it_was_found_for_alone() -> None:
+def test_a_proof_holds_for_what_it_was_found_for_alone():
     assert STANDING is not None
     assert FALLING is not None
     assert (STANDING.stands, FALLING.stands) == (True, False)
@@ -226,7 +218,7 @@ def test_a_proof_holds_for_what_it_was_found_for_alone() -> None:
     assert not proves(FALLING.proof, STANDING.structure)
 
 
-def test_a_proof_with_any_force_changed_or_left_out_is_refused() -> None:
+def test_a_proof_with_any_force_changed_or_left_out_is_refused():
     assert STANDING is not None
     paths = list(numbers(STANDING.proof))
     for path in paths[:: max(1, len(paths) // 150)]:
@@ -239,7 +231,7 @@ def test_a_proof_with_any_force_changed_or_left_out_is_refused() -> None:
 
 
 @pytest.mark.parametrize("field", ["bodies", "contacts", "narrow"])
-def test_a_standing_that_is_not_as_its_proof_has_it_is_refused(field: str) -> None:
+def test_a_standing_that_is_not_as_its_proof_has_it_is_refused(field):
     assert STANDING is not None
     at = STANDING.structure._fields.index(field)
     for path in numbers(STANDING.structure[at]):
@@ -257,7 +249,7 @@ def test_a_standing_that_is_not_as_its_proof_has_it_is_refused(field: str) -> No
         assert not proves(STANDING.proof, wrong), (field, path)
 
 
-def test_a_fall_with_its_motion_or_its_contacts_changed_is_refused() -> None:
+def test_a_fall_with_its_motion_or_its_contacts_changed_is_refused():
     assert FALLING is not None
     motion = FALLING.proof.motion
     still = ((0, 0, 0), (0, 0, 0))
@@ -275,7 +267,7 @@ def test_a_fall_with_its_motion_or_its_contacts_changed_is_refused() -> None:
         assert not proves(FALLING.proof, wrong)
 
 
-def test_the_checker_needs_the_standard_library_alone() -> None:
+def test_the_checker_needs_the_standard_library_alone():
     tree = ast.parse(Path(certificate.__file__).read_text(encoding="utf-8"))
     names = [node.module for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
     assert not [node for node in ast.walk(tree) if isinstance(node, ast.Import)]

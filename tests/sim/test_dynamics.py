@@ -14,7 +14,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from phyblock.domain.blocks import BlockType
 from phyblock.domain.scene import Block
 from phyblock.making.scenes.sketch import POSES
 from phyblock.sim import dynamics
@@ -56,7 +55,7 @@ def poses_as_hex(blocks: Sequence[Block], duration_s: float) -> str:
     ("block_type", "pose"),
     [(t, p) for t, poses in POSES.items() for p in poses if p not in LINE_BALANCED],
 )
-def test_a_block_stays_where_it_is_laid_down(block_type: BlockType, pose: str) -> None:
+def test_a_block_stays_where_it_is_laid_down(block_type, pose):
     lifted = block(1, block_type, (0.0, 0.0, 0.5), POSES[block_type][pose])
     down = replace(lifted, position_m=(0.0, 0.0, 0.5 - drop_height_m(lifted, [])))
     with World() as world:
@@ -66,7 +65,7 @@ def test_a_block_stays_where_it_is_laid_down(block_type: BlockType, pose: str) -
         assert world.pose(1).angle_deg(Pose.goal(down)) < 1.0
 
 
-def test_the_same_scene_gives_the_same_bits_in_another_process_that_loads_engines_late() -> None:
+def test_the_same_scene_gives_the_same_bits_in_another_process_that_loads_engines_late():
     blocks = counterweighted_beam()[:3]
     here = poses_as_hex(blocks, 0.5)
     assert poses_as_hex(blocks, 0.5) == here
@@ -99,7 +98,7 @@ print(execute([
 """A plan that falls here and there, where a last digit decides how blocks come to lie."""
 
 
-def test_execution_depends_on_no_processor() -> None:
+def test_execution_depends_on_no_processor():
     """OpenBLAS adds up in another order, and without fused operations, for an old processor."""
 
     def printed(**more: str) -> str:
@@ -113,20 +112,20 @@ def test_execution_depends_on_no_processor() -> None:
 
 
 @pytest.mark.slow
-def test_of_all_official_scenes_only_the_floating_fall(official_checkout: Path) -> None:
+def test_of_all_official_scenes_only_the_floating_fall(official_checkout):
     trial = Trial(physics=(Physics(),))
     tasks = official_tasks(official_checkout)
     assert {t.scene.id for t in tasks if not check(t.scene.blocks, trial).stable} == FLOATING
 
 
 @pytest.mark.parametrize("name", ["l1-dolmen", "l2-rocket", "l4-playground"])
-def test_steps_stand_as_the_long_trial_says(name: str) -> None:
+def test_steps_stand_as_the_long_trial_says(name):
     blocks = designed_scene(name).blocks
     assert [step.fallen for step in check_steps(blocks, FIRST)] == [()] * len(blocks)
     assert all(check(blocks[:count], FIRST).stable for count in range(1, 5))
 
 
-def test_what_falls_midway_or_slowly_is_named_at_its_step() -> None:
+def test_what_falls_midway_or_slowly_is_named_at_its_step():
     sketch = built("cube; cuboid3:flat-y; 2 cube 2.8")
     steps = [(), (), (2, 3), ()]
     assert [step.fallen for step in check_steps(sketch.blocks, FIRST)] == steps
@@ -143,7 +142,7 @@ shifts_m = st.floats(-1, 1).map(lambda meters: round(meters, 6))
 
 @settings(max_examples=4, deadline=None)
 @given(shifts_m, shifts_m)
-def test_no_verdict_depends_on_a_place(x_m: float, y_m: float) -> None:
+def test_no_verdict_depends_on_a_place(x_m, y_m):
     moved = [
         replace(one, position_m=(round(x + x_m, 6), round(y + y_m, 6), z))
         for one in WHEELS
@@ -155,7 +154,7 @@ def test_no_verdict_depends_on_a_place(x_m: float, y_m: float) -> None:
 
 
 @pytest.mark.parametrize("trial", [ONE_SETTING, DEFAULT_TRIAL], ids=["one", "default"])
-def test_the_same_falls_whatever_was_tried_before(trial: Trial) -> None:
+def test_the_same_falls_whatever_was_tried_before(trial):
     def settled(blocks: Sequence[Block], *, in_new_worlds: bool) -> Settled:
         forgotten = (dynamics._settled, dynamics._stays)
         for cached in (*forgotten, dynamics._open_world) if in_new_worlds else forgotten:
@@ -174,7 +173,7 @@ def test_the_same_falls_whatever_was_tried_before(trial: Trial) -> None:
     assert tipped.blocks[1].position_m[2] < SEESAW[1].position_m[2] - 0.01
 
 
-def test_what_rests_on_a_removed_block_moves_and_nothing_else() -> None:
+def test_what_rests_on_a_removed_block_moves_and_nothing_else():
     three = (*tower(2), block(3, "cube", (0.1, 0.0, 0.025)))
     outcome = after_removal(three, 1)
     assert outcome.is_clear
@@ -187,6 +186,6 @@ def test_what_rests_on_a_removed_block_moves_and_nothing_else() -> None:
 
 
 @pytest.mark.parametrize(("over_m", "verdict"), [(0.025, None), (0.035, False), (0.015, True)])
-def test_weight_just_over_an_edge_is_not_clear(over_m: float, verdict: bool | None) -> None:
+def test_weight_just_over_an_edge_is_not_clear(over_m, verdict):
     """A cube half of which hangs over falls in every level world, and stays on many a table."""
     assert holds((tower(1)[0], block(2, "cube", (over_m, 0.0, 0.075))), 2) is verdict

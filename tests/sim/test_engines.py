@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from phyblock.domain.blocks import SHAPES, BlockType, euler_deg_to_matrix
+from phyblock.domain.blocks import SHAPES, euler_deg_to_matrix
 from phyblock.domain.scene import Block
 from phyblock.errors import InputError
 from phyblock.scoring.pose import blocks_reached, overlap_volume, placed
@@ -75,9 +75,7 @@ def fall(engine: PhysicsEngine, blocks: list[Block], steps: int) -> str:
 
 @given(block_types, heights, eulers)
 @settings(max_examples=20)
-def test_a_block_is_where_it_was_put_and_at_rest(
-    engine: PhysicsEngine, block_type: BlockType, height_m: float, euler_deg
-) -> None:
+def test_a_block_is_where_it_was_put_and_at_rest(engine, block_type, height_m, euler_deg):
     one = block(3, block_type, (0.3, -0.2, height_m), euler_deg)
     with engine.open(PHYSICS) as opened:
         add_all(opened, [one])
@@ -86,7 +84,7 @@ def test_a_block_is_where_it_was_put_and_at_rest(
         assert_allclose(opened.velocity(3), 0.0)
 
 
-def test_the_same_calls_give_the_same_bits_beside_others(engine: PhysicsEngine) -> None:
+def test_the_same_calls_give_the_same_bits_beside_others(engine):
     falling = counterweighted_beam()[:3]
     alone = fall(engine, falling, 40)
     with engine.open(Physics(1 / 300, 80, 0.1)) as other:
@@ -97,7 +95,7 @@ def test_the_same_calls_give_the_same_bits_beside_others(engine: PhysicsEngine) 
     assert fall(engine, falling, 40) == alone
 
 
-def test_a_block_in_the_air_falls_the_way_of_gravity(engine: PhysicsEngine) -> None:
+def test_a_block_in_the_air_falls_the_way_of_gravity(engine):
     downhill = (0.6, 0.0, -0.8)
     x, y, z = (GRAVITY_M_S2 * part for part in downhill)
     one, duration_s = block(1, "triangle", (0.0, 0.0, 3.0)), 0.25
@@ -113,9 +111,7 @@ def test_a_block_in_the_air_falls_the_way_of_gravity(engine: PhysicsEngine) -> N
 
 
 @pytest.mark.parametrize(("friction", "slides"), [(0.5, True), (0.7, False)])
-def test_friction_holds_a_block_on_a_floor_that_leans(
-    engine: PhysicsEngine, friction: float, slides: bool
-) -> None:
+def test_friction_holds_a_block_on_a_floor_that_leans(engine, friction, slides):
     """By 31 degrees: a coefficient over 0.6 holds."""
     x, z = (GRAVITY_M_S2 * part for part in (0.6 * 0.857, -0.857))
     one = block(1, "cuboid2", (0.0, 0.0, 0.0125))
@@ -125,7 +121,7 @@ def test_friction_holds_a_block_on_a_floor_that_leans(
         assert (opened.pose(1).distance_m(Pose.goal(one)) > 0.02) == slides
 
 
-def test_masses_decide_on_a_beam(engine: PhysicsEngine) -> None:
+def test_masses_decide_on_a_beam(engine):
     """A slab holds a cylinder on the other end where it is heavy."""
     beam = counterweighted_beam()
     beam[2] = replace(beam[2], type="cylinder", position_m=(0.0, 0.07, 0.125))
@@ -138,9 +134,7 @@ def test_masses_decide_on_a_beam(engine: PhysicsEngine) -> None:
 
 
 @pytest.mark.parametrize("name", ENGINES)
-def test_an_engine_that_is_unknown_or_not_installed_is_refused(
-    name: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_engine_that_is_unknown_or_not_installed_is_refused(name, monkeypatch):
     with pytest.raises(InputError, match=f"allowed: {', '.join(ENGINES)}"):
         chosen("phyblock.sim.mujoco:MujocoEngine")
     monkeypatch.setattr("phyblock.sim.engine.find_spec", lambda _: None)
@@ -158,7 +152,7 @@ def ends(blocks: list[Block | None], engine: PhysicsEngine, **limits: float) -> 
     return [step.end for step in execute(blocks, ExecutionLimits(**limits), engine).steps]
 
 
-def test_a_tower_stands_in_its_order_and_falls_in_the_opposite_one(engine: PhysicsEngine) -> None:
+def test_a_tower_stands_in_its_order_and_falls_in_the_opposite_one(engine):
     done = execute(tower(3), engine=engine)
     assert [step.end for step in done.steps] == ["stands"] * 3
     assert [len(world) for world in done.worlds] == [1, 2, 3]
@@ -167,9 +161,7 @@ def test_a_tower_stands_in_its_order_and_falls_in_the_opposite_one(engine: Physi
     assert ends(tower(3)[::-1], engine)[0] == "falls"
 
 
-def test_overlaps_beyond_the_tolerance_are_refused_and_smaller_ones_give_way(
-    engine: PhysicsEngine,
-) -> None:
+def test_overlaps_beyond_the_tolerance_are_refused_and_smaller_ones_give_way(engine):
     first = tower(1)[0]
     deep, slight = at(first, 0.03, 0, 0.025), at(first, 0.046, 0, 0.025)
     assert ends([first, deep, slight], engine) == ["stands", "overlaps", "stands"]
@@ -181,7 +173,7 @@ def test_overlaps_beyond_the_tolerance_are_refused_and_smaller_ones_give_way(
     assert done.blocks[1].position_m[0] == pytest.approx(0.05, abs=0.001)
 
 
-def test_what_is_under_the_floor_or_no_block_is_not_put(engine: PhysicsEngine) -> None:
+def test_what_is_under_the_floor_or_no_block_is_not_put(engine):
     first = tower(1)[0]
     blocks = [at(first, 0, 0, 0.01), at(first, 0, 0, -0.5), None, at(first, 0, 0, 0.0215)]
     done = execute(blocks, engine=engine)
@@ -190,7 +182,7 @@ def test_what_is_under_the_floor_or_no_block_is_not_put(engine: PhysicsEngine) -
     assert done.blocks[0].order == 4
 
 
-def test_who_is_knocked_over_is_named_and_stays_so(engine: PhysicsEngine) -> None:
+def test_who_is_knocked_over_is_named_and_stays_so(engine):
     beam = counterweighted_beam()
     done = execute([*beam[:3], None, beam[0]], engine=engine)
     assert [step.end for step in done.steps[:2]] == ["stands", "stands"]
@@ -201,16 +193,14 @@ def test_who_is_knocked_over_is_named_and_stays_so(engine: PhysicsEngine) -> Non
     assert blocks_reached(beam, done.blocks, 1, 10) < len(beam)
 
 
-def test_the_same_plan_ends_the_same_to_the_last_digit_whatever_came_before(
-    engine: PhysicsEngine,
-) -> None:
+def test_the_same_plan_ends_the_same_to_the_last_digit_whatever_came_before(engine):
     beam: list[Block | None] = [*counterweighted_beam()[:3]]
     first = execute(beam, engine=engine)
     execute(tower(2), engine=engine)
     assert execute(beam, engine=engine) == first
 
 
-def test_what_stands_elsewhere_changes_no_verdict(engine: PhysicsEngine) -> None:
+def test_what_stands_elsewhere_changes_no_verdict(engine):
     far = [at(one, 0.3, 0.3, one.position_m[2]) for one in tower(3)]
     near = counterweighted_beam()[:3]
     alone, beside = execute(near, engine=engine), execute([*far, *near], engine=engine)
@@ -225,9 +215,7 @@ def test_what_stands_elsewhere_changes_no_verdict(engine: PhysicsEngine) -> None
     st.tuples(*[st.floats(-0.03, 0.03, allow_nan=False)] * 3),
     st.floats(0.0, 90.0, allow_nan=False),
 )
-def test_voxels_know_what_two_blocks_share_nearly(
-    kind: BlockType, way_m: tuple[float, float, float], turn_deg: float
-) -> None:
+def test_voxels_know_what_two_blocks_share_nearly(kind, way_m, turn_deg):
     one = block(1, kind, (0.01, 0.02, 0.06))
     x, y, z = one.position_m
     dx, dy, dz = way_m
@@ -242,7 +230,7 @@ def test_voxels_know_what_two_blocks_share_nearly(
     assert voxel_iou([one], [one]) == 1
 
 
-def test_a_voxel_counts_by_how_much_of_it_a_block_fills() -> None:
+def test_a_voxel_counts_by_how_much_of_it_a_block_fills():
     cube = block(1, "cube", (0.0, 0.0, 0.025))
     assert len(filled_voxels([cube])[0]) == round((0.05 / VOXEL_M) ** 3)
     assert voxel_iou([cube], [at(cube, 0.025, 0, 0.025)]) == pytest.approx(1 / 3)

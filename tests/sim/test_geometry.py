@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,8 +16,6 @@ from phyblock.domain.blocks import (
     BLOCK_TYPES,
     KIT_PALETTE,
     SHAPES,
-    BlockType,
-    Color,
     euler_deg_to_quat_xyzw,
     quat_xyzw_to_matrix,
 )
@@ -48,7 +44,7 @@ def is_closed(mesh: Mesh) -> bool:
 
 
 @every_type
-def test_mass_and_extent_are_those_of_the_block_library(block_type: BlockType) -> None:
+def test_mass_and_extent_are_those_of_the_block_library(block_type):
     solid, shape = solid_mesh(block_type), SHAPES[block_type]
     assert_allclose(solid.volume_m3, shape.volume_m3, rtol=1e-9)
     assert_allclose(solid.center_of_mass_m, shape.center_of_mass_m, atol=1e-9)
@@ -57,7 +53,7 @@ def test_mass_and_extent_are_those_of_the_block_library(block_type: BlockType) -
 
 
 @every_type
-def test_pieces_are_convex_and_fill_the_block(block_type: BlockType) -> None:
+def test_pieces_are_convex_and_fill_the_block(block_type):
     pieces = collision_pieces(block_type)
     assert len(pieces) == (10 if block_type == "arch" else 1)
     hulls = [ConvexHull(piece.vertices_m) for piece in pieces]
@@ -67,7 +63,7 @@ def test_pieces_are_convex_and_fill_the_block(block_type: BlockType) -> None:
 
 
 @every_type
-def test_inset_moves_every_plane_by_that_much(block_type: BlockType) -> None:
+def test_inset_moves_every_plane_by_that_much(block_type):
     inset_m = 0.001
     full, inset = collision_pieces(block_type), collision_pieces(block_type, inset_m)
     for outer, inner in zip(full, inset, strict=True):
@@ -80,7 +76,7 @@ def test_inset_moves_every_plane_by_that_much(block_type: BlockType) -> None:
 
 
 @every_type
-def test_what_is_drawn_is_the_solid_made_round(block_type: BlockType) -> None:
+def test_what_is_drawn_is_the_solid_made_round(block_type):
     """Full circles hold 2 % more than 18-gons, and half circles 2 % more than ten chords."""
     drawn, solid, shape = drawn_mesh(block_type), solid_mesh(block_type), SHAPES[block_type]
     assert is_closed(drawn)
@@ -94,16 +90,12 @@ FACES = {"arch": 8, "cylinder": 3, "semi_cylinder": 4, "triangle": 5}
 
 @every_type
 @pytest.mark.parametrize("mesh_of", [solid_mesh, drawn_mesh])
-def test_a_round_side_is_one_face(
-    mesh_of: Callable[[BlockType], Mesh], block_type: BlockType
-) -> None:
+def test_a_round_side_is_one_face(mesh_of, block_type):
     assert len(set(mesh_of(block_type).faces.tolist())) == FACES.get(block_type, 6)
 
 
 @pytest.mark.parametrize(("block_type", "color"), KIT_PALETTE)
-def test_extents_are_those_of_the_official_mesh(
-    block_type: BlockType, color: Color, official_checkout: Path
-) -> None:
+def test_extents_are_those_of_the_official_mesh(block_type, color, official_checkout):
     """Of its part in the block's color, without black edges."""
     path = official_checkout / "data" / "block_assets" / f"{block_type}_{color}.obj"
     vertices, used, colored = [], set(), False
@@ -145,7 +137,7 @@ def share_a_point(first: ConvexPiece, second: ConvexPiece) -> bool:
 
 @given(block_types, eulers, block_types, eulers, shifts_m, shifts_m, shifts_m)
 @settings(max_examples=60, deadline=None)
-def test_separation_agrees_with_a_linear_program(one, turn, other, twist, x, y, z) -> None:
+def test_separation_agrees_with_a_linear_program(one, turn, other, twist, x, y, z):
     first = placed(block(1, one, (0.0, 0.0, 0.0), turn))[0]
     second = placed(block(2, other, (x, y, z), twist))[0]
     gap_m = separating_axes(first, second).gap_m
@@ -156,7 +148,7 @@ def test_separation_agrees_with_a_linear_program(one, turn, other, twist, x, y, 
 
 @given(block_types, eulers, block_types, eulers, shifts_m, shifts_m)
 @settings(max_examples=60, deadline=None)
-def test_a_block_falls_just_until_it_touches(one, turn, other, twist, x, y) -> None:
+def test_a_block_falls_just_until_it_touches(one, turn, other, twist, x, y):
     first = placed(block(1, one, (0.0, 0.0, 0.0), turn))[0]
     second = placed(block(2, other, (x, y, 0.4), twist))[0]
     fall_m = drop_m(separating_axes(first, second))
@@ -170,13 +162,13 @@ def test_a_block_falls_just_until_it_touches(one, turn, other, twist, x, y) -> N
 
 @given(angles_deg, shifts_m, shifts_m, st.integers(1, 5))
 @settings(max_examples=25, deadline=None)
-def test_support_of_a_turned_tower(angle_deg, x, y, height) -> None:
+def test_support_of_a_turned_tower(angle_deg, x, y, height):
     graph = support_graph(turned(tower(height), angle_deg, (x, y)))
     assert graph == {i + 1: frozenset({i}) for i in range(height)}
 
 
 @given(st.floats(-0.02, 0.3))
-def test_a_block_hangs_or_overlaps_by_what_it_was_moved(rise_m: float) -> None:
+def test_a_block_hangs_or_overlaps_by_what_it_was_moved(rise_m):
     assume(abs(rise_m) > 0.0011)
     lower, upper = tower(2)
     moved_one = replace(upper, position_m=(0.0, 0.0, upper.position_m[2] + rise_m))
@@ -187,7 +179,7 @@ def test_a_block_hangs_or_overlaps_by_what_it_was_moved(rise_m: float) -> None:
     assert found_m == pytest.approx(rise_m, abs=1e-9)
 
 
-def test_a_plank_rests_on_both_its_posts_and_nothing_under_the_arch() -> None:
+def test_a_plank_rests_on_both_its_posts_and_nothing_under_the_arch():
     posts = [block(i, "cube", (0.0, y, 0.025)) for i, y in ((1, -0.05), (2, 0.05))]
     plank = block(3, "cuboid3", (0.0, 0.0, 0.0625), (0.0, 0.0, 90.0))
     arch = block(4, "arch", (0.0, 0.0, 0.1))
@@ -199,7 +191,7 @@ def test_a_plank_rests_on_both_its_posts_and_nothing_under_the_arch() -> None:
 
 
 @pytest.mark.slow
-def test_all_official_scenes(official_checkout: Path) -> None:
+def test_all_official_scenes(official_checkout):
     tasks = official_tasks(official_checkout)
     blocks = {task.scene.id: task.scene.blocks for task in tasks}
     assert {i for i, of in blocks.items() if find_overlaps(of, ANNOTATION_ERROR_M)} == OVERLAPPING

@@ -19,7 +19,7 @@ from numpy.testing import assert_allclose
 from numpy.typing import NDArray
 from PIL import Image, ImageSequence
 
-from phyblock.domain.blocks import BLOCK_TYPES, KIT_PALETTE, Color
+from phyblock.domain.blocks import BLOCK_TYPES, KIT_PALETTE
 from phyblock.domain.question import Mark, QuestionPicture
 from phyblock.domain.scene import Block, Candidate, CandidateSet, Scene
 from phyblock.errors import DataError
@@ -61,7 +61,7 @@ from phyblock.sim.question_pictures import (
     state_picture,
 )
 from phyblock.sim.ruled import kit_key, ruled_key
-from phyblock.types import BACKGROUNDS, Background
+from phyblock.types import BACKGROUNDS
 from tests.shipped import TASKS, built_in_questions
 from tests.sim.structures import block, clouds, designed_scene, scene_of, tower
 
@@ -93,7 +93,7 @@ def pixels(png: bytes) -> NDArray[np.int64]:
 
 
 @given(angles, elevations)
-def test_axes_are_a_right_handed_frame(azimuth_deg: float, elevation_deg: float) -> None:
+def test_axes_are_a_right_handed_frame(azimuth_deg, elevation_deg):
     """But for their rounding to 12 decimals."""
     axes = view_axes(azimuth_deg, elevation_deg)
     right, up, forward = axes
@@ -112,7 +112,7 @@ def test_axes_are_a_right_handed_frame(azimuth_deg: float, elevation_deg: float)
 )
 def test_framing_keeps_every_point_in_the_window_and_comes_as_close_as_it_may(
     cloud, azimuth, elevation, window, near_m
-) -> None:
+):
     where = np.array(cloud)
     camera = frame(where, view_axes(azimuth, elevation), window, near_m)
     across, up = camera.project(where).T
@@ -127,7 +127,7 @@ def test_framing_keeps_every_point_in_the_window_and_comes_as_close_as_it_may(
 
 
 @pytest.mark.parametrize("view", sorted(VIEWS))
-def test_the_renderer_draws_where_the_camera_says(view: str) -> None:
+def test_the_renderer_draws_where_the_camera_says(view):
     camera = goal_camera(scene := designed_scene("l2-rocket"), PictureStyle.from_view(view))
     rows, columns = np.nonzero(shoot(scene.blocks, camera, 512).block >= 0)
     places = np.vstack([camera.to_pixels(drawn_m(one), 512) for one in scene.blocks])
@@ -142,7 +142,7 @@ def lies_between_planes(blocks: Sequence[Block], camera: Camera) -> bool:
 
 
 @pytest.mark.parametrize("every", [16, pytest.param(1, marks=pytest.mark.slow)])
-def test_no_built_in_picture_is_cut_open_and_blocks_of_wide_goals_are_large(every: int) -> None:
+def test_no_built_in_picture_is_cut_open_and_blocks_of_wide_goals_are_large(every):
     for task in TASKS[::every]:
         style = goal_style(task.scene, STYLE)
         camera = goal_camera(task.scene, style)
@@ -157,9 +157,7 @@ def test_no_built_in_picture_is_cut_open_and_blocks_of_wide_goals_are_large(ever
 
 @given(st.lists(st.sampled_from(EVERY_LOOK), min_size=1, max_size=16), st.floats(1, 89))
 @settings(max_examples=30, deadline=None)
-def test_all_candidates_of_a_grid_have_one_scale_and_the_largest_fills_its_cell(
-    looks, elevation: float
-) -> None:
+def test_all_candidates_of_a_grid_have_one_scale_and_the_largest_fills_its_cell(looks, elevation):
     style = replace(STYLE, elevation_deg=elevation)
     blocks = [on_the_floor(*look.look[:2], look.euler_deg) for look in looks]
     distance_m = common_distance_m(blocks, style)
@@ -174,7 +172,7 @@ def test_all_candidates_of_a_grid_have_one_scale_and_the_largest_fills_its_cell(
     assert max(fullest) == pytest.approx(1.0, abs=1e-6)
 
 
-def test_every_look_has_a_picture_of_its_own_that_fills_its_cell_above_the_number() -> None:
+def test_every_look_has_a_picture_of_its_own_that_fills_its_cell_above_the_number():
     found: dict[object, NDArray[np.int64]] = {}
     for candidate in EVERY_LOOK:
         one = on_the_floor(candidate.type, candidate.color, candidate.euler_deg)
@@ -200,7 +198,7 @@ def luminance(rgb: NDArray[np.float64]) -> NDArray[np.float64]:
 
 @pytest.mark.parametrize("background", slowly)
 @pytest.mark.parametrize("color", COLOR_RGB)
-def test_every_face_stands_out_from_the_floor(background: Background, color: Color) -> None:
+def test_every_face_stands_out_from_the_floor(background, color):
     """By a contrast of 3:1, its own or that of the line round it, along nine tenths of its edge.
 
     The floor is taken nine pixels to the side, where it may be in shadow.
@@ -219,7 +217,7 @@ def test_every_face_stands_out_from_the_floor(background: Background, color: Col
     assert np.mean(clear) >= 0.9
 
 
-def test_the_same_bytes_in_every_process() -> None:
+def test_the_same_bytes_in_every_process():
     scene = designed_scene("l3-torii")
     candidates = make_candidates(scene)
     here = [goal_png(scene, SMALL), candidates_png(candidates, SMALL)]
@@ -232,7 +230,7 @@ def test_the_same_bytes_in_every_process() -> None:
     assert not any(chunk in here[0] for chunk in (b"tIME", b"tEXt"))
 
 
-def test_keys_name_the_content_and_not_the_scene() -> None:
+def test_keys_name_the_content_and_not_the_scene():
     scene, other = designed_scene("l1-gate"), designed_scene("l1-dog")
     assert goal_key(scene, SMALL) == goal_key(replace(scene, id="another", levels=(4,)), SMALL)
     first = replace(scene.blocks[0], euler_deg=(0.0, 0.0, 90.0))
@@ -249,7 +247,7 @@ def test_keys_name_the_content_and_not_the_scene() -> None:
     assert all(len(key) == hashlib.sha256().digest_size * 2 for key in keys)
 
 
-def test_a_style_is_checked_and_can_be_sent_to_a_process() -> None:
+def test_a_style_is_checked_and_can_be_sent_to_a_process():
     assert pickle.loads(pickle.dumps(SMALL)) == SMALL
     bad = [{"size_px": 10}, {"background": "lava"}, {"elevation_deg": -5.0}]
     for wrong in [*bad, {"azimuth_deg": float("nan")}]:
@@ -262,7 +260,7 @@ def test_a_style_is_checked_and_can_be_sent_to_a_process() -> None:
 
 
 @given(angles, st.floats(-85, 85), angles)
-def test_any_orientation_comes_back_from_its_quaternion(x: float, y: float, z: float) -> None:
+def test_any_orientation_comes_back_from_its_quaternion(x, y, z):
     pose = Pose.goal(replace(TOWER[0], euler_deg=(x, y, z)))
     back = replace(TOWER[0], euler_deg=quat_xyzw_to_euler_deg(pose.quat_xyzw))
     assert Pose.goal(back).angle_deg(pose) < 0.01
@@ -270,9 +268,7 @@ def test_any_orientation_comes_back_from_its_quaternion(x: float, y: float, z: f
 
 @given(clouds(), st.integers(1, 6), angles, elevations)
 @settings(max_examples=30, deadline=None)
-def test_no_picture_is_cut_off_or_open_whatever_it_frames(
-    blocks, framed, azimuth, elevation
-) -> None:
+def test_no_picture_is_cut_off_or_open_whatever_it_frames(blocks, framed, azimuth, elevation):
     """Not even where blocks lie behind the place from which those in the frame are seen best."""
     style = PictureStyle(azimuth_deg=azimuth, elevation_deg=elevation)
     corners = np.vstack([drawn_m(one) for one in blocks])
@@ -284,7 +280,7 @@ def test_no_picture_is_cut_off_or_open_whatever_it_frames(
     assert lies_between_planes(drawn_blocks(recipe), question_camera(recipe, STYLE))
 
 
-def test_marks_show_on_the_blocks_that_they_are_on() -> None:
+def test_marks_show_on_the_blocks_that_they_are_on():
     marked, plain = (pixels(question_png(one, STYLE)) for one in (MARKED, PLAIN))
     assert 1000 < (np.abs(marked - plain).max(axis=2) > 60).sum() < 12000
     for one in TOWER:
@@ -293,7 +289,7 @@ def test_marks_show_on_the_blocks_that_they_are_on() -> None:
         assert seen_order(PLAIN, seen(PLAIN), mark.position_m) == one.order
 
 
-def test_keys_of_questions_differ_exactly_where_pixels_may() -> None:
+def test_keys_of_questions_differ_exactly_where_pixels_may():
     others = [
         MARKED,
         replace(PLAIN, view_deg=(50.0, 22.0)),
@@ -312,7 +308,7 @@ def test_keys_of_questions_differ_exactly_where_pixels_may() -> None:
     assert question_key(high, STYLE) == question_key(low, STYLE)
 
 
-def test_a_state_is_seen_as_the_goal_is_and_changes_where_a_block_comes() -> None:
+def test_a_state_is_seen_as_the_goal_is_and_changes_where_a_block_comes():
     scene = TASK.scene
     states = [
         question_png(state_picture(scene, scene.blocks[:count], SMALL), SMALL)
@@ -329,9 +325,7 @@ def test_a_state_is_seen_as_the_goal_is_and_changes_where_a_block_comes() -> Non
     st.floats(0, 360),
     st.floats(5, 90),
 )
-def test_all_that_is_ruled_and_written_is_in_the_picture(
-    places: list[tuple[float, float, float]], azimuth_deg: float, elevation_deg: float
-) -> None:
+def test_all_that_is_ruled_and_written_is_in_the_picture(places, azimuth_deg, elevation_deg):
     blocks = [block(n, "cube", place) for n, place in enumerate(places, 1)]
     style = replace(SMALL, azimuth_deg=azimuth_deg, elevation_deg=elevation_deg)
     field = ruled._field(blocks, style)
@@ -350,7 +344,7 @@ def test_all_that_is_ruled_and_written_is_in_the_picture(
     assert near @ -camera.axes[2, :2] >= -1e-6
 
 
-def test_an_animation_ends_in_the_goal_and_blocks_are_placed_in_order() -> None:
+def test_an_animation_ends_in_the_goal_and_blocks_are_placed_in_order():
     scene = designed_scene("l2-rocket")
     with Image.open(io.BytesIO(assembly_gif(scene, SMALL))) as image:
         assert (image.n_frames, image.info["loop"]) == (len(scene), 0)
@@ -361,7 +355,7 @@ def test_an_animation_ends_in_the_goal_and_blocks_are_placed_in_order() -> None:
         assembly_gif(backward, SMALL)
 
 
-def test_frames_of_an_episode_show_goal_candidates_and_world() -> None:
+def test_frames_of_an_episode_show_goal_candidates_and_world():
     blocks = TASK.scene.blocks
     steps = [
         FilmStep("placed", "good", 2, blocks[:1]),

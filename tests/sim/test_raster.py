@@ -115,9 +115,7 @@ def is_hidden(
 
 @given(clouds() | heaps(), views, st.integers(0, 2**31))
 @settings(max_examples=40, deadline=None)
-def test_each_pixel_shows_what_the_ray_through_its_center_meets(
-    blocks: list[Block], view: tuple[float, float], seed: int
-) -> None:
+def test_each_pixel_shows_what_the_ray_through_its_center_meets(blocks, view, seed):
     props = props_of(blocks)
     camera = camera_on(props, view)
     pixels = some_pixels(seed)
@@ -133,9 +131,7 @@ def test_each_pixel_shows_what_the_ray_through_its_center_meets(
 
 @given(heaps(), views, st.integers(0, 2**31))
 @settings(max_examples=25, deadline=None)
-def test_a_pixel_is_as_bright_as_its_face_and_what_stands_before_the_light_say(
-    blocks: list[Block], view: tuple[float, float], seed: int
-) -> None:
+def test_a_pixel_is_as_bright_as_its_face_and_what_stands_before_the_light_say(blocks, view, seed):
     """Points near the edge of a shadow are left out; round faces bend between their facets."""
     props = props_of(blocks)
     camera = camera_on(props, view)
@@ -159,9 +155,7 @@ def test_a_pixel_is_as_bright_as_its_face_and_what_stands_before_the_light_say(
 
 @given(clouds(), views, st.integers(0, 2**31))
 @settings(max_examples=30, deadline=None)
-def test_the_ground_is_in_shadow_where_something_stands_before_the_light(
-    blocks: list[Block], view: tuple[float, float], seed: int
-) -> None:
+def test_the_ground_is_in_shadow_where_something_stands_before_the_light(blocks, view, seed):
     props = props_of(blocks)
     camera = camera_on(props, view)
     pixels = some_pixels(seed)
@@ -175,7 +169,7 @@ def test_the_ground_is_in_shadow_where_something_stands_before_the_light(
 
 @given(clouds(), views, st.randoms(use_true_random=False))
 @settings(max_examples=20, deadline=None)
-def test_the_order_of_blocks_changes_their_numbers_alone(blocks, view, random) -> None:
+def test_the_order_of_blocks_changes_their_numbers_alone(blocks, view, random):
     props = props_of(blocks)
     camera = camera_on(props, view)
     order = list(range(len(props)))
@@ -186,7 +180,7 @@ def test_the_order_of_blocks_changes_their_numbers_alone(blocks, view, random) -
     assert (np.append(order, -1)[other.prop] == one.prop).all()
 
 
-def test_nothing_shows_before_the_near_plane_or_behind_the_far_one_in_any_thread() -> None:
+def test_nothing_shows_before_the_near_plane_or_behind_the_far_one_in_any_thread():
     props = props_of([block(1, "cube", (0.0, 0.0, 0.025)), block(2, "cube", (0.0, 0.3, 0.025))])
     camera = camera_on(props, (60.0, 25.0))
     depths = [(prop.pose.position_m - camera.eye_m) @ camera.axes[2] for prop in props]
@@ -200,7 +194,7 @@ def test_nothing_shows_before_the_near_plane_or_behind_the_far_one_in_any_thread
         assert list(found)[1::2] == [alone.rgb.tobytes()] * 4
 
 
-def test_what_reaches_behind_the_camera_is_drawn_as_far_as_it_is_before_it() -> None:
+def test_what_reaches_behind_the_camera_is_drawn_as_far_as_it_is_before_it():
     """A long block beside the eye: only what is in front of it can show."""
     plank = Block(1, "cuboid3", "red", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (), 1)
     camera = Camera(np.array([-0.05, 0.0, 0.05]), view_axes(180.0, 1.0), 1e-3, 10.0, 90.0)
@@ -209,7 +203,7 @@ def test_what_reaches_behind_the_camera_is_drawn_as_far_as_it_is_before_it() -> 
     assert not shown[: SIZE_PX // 2].any()
 
 
-def test_the_bytes_of_a_picture_are_the_same_on_every_machine() -> None:
+def test_the_bytes_of_a_picture_are_the_same_on_every_machine():
     """`RASTER_VERSION` is raised where these change on purpose, or cached pictures are mixed."""
     props = props_of(
         [
@@ -224,7 +218,7 @@ def test_the_bytes_of_a_picture_are_the_same_on_every_machine() -> None:
     assert digest.hexdigest() == DIGEST
 
 
-def test_no_matrix_product_decides_a_pixel() -> None:
+def test_no_matrix_product_decides_a_pixel():
     """A BLAS adds up in another order on another machine."""
     sim = Path(phyblock.sim.__file__).parent
     for name in ("raster", "camera", "backgrounds", "pictures", "geometry"):

@@ -70,9 +70,7 @@ def here(inside: Workspace) -> Workspace:
     return inside
 
 
-def test_scoring_again_fills_in_what_older_records_lack(
-    here: Workspace, request: pytest.FixtureRequest
-) -> None:
+def test_scoring_again_fills_in_what_older_records_lack(here, request):
     assert not call("run", "suite.yaml", "--out", here.out, "--no-report")
     stored = here.records()
     assert not any("needless_steps" in record["counts"] for record in stored)
@@ -123,7 +121,7 @@ def half() -> Iterator[None]:
 @pytest.mark.parametrize(
     "more", [{}, {"name": "steps"}, {"name": "table1"}, {"name": "mine", "tables": ("errors",)}]
 )
-def test_a_name_that_is_taken_is_refused(more: dict[str, Any]) -> None:
+def test_a_name_that_is_taken_is_refused(more):
     kind = type("Taken", (FullPlanning,), {"tables": (), **more})
     with pytest.raises(ValueError, match="has this name"):
         registry.register_track(kind)
@@ -131,7 +129,7 @@ def test_a_name_that_is_taken_is_refused(more: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize("track", sorted(registry.known_tracks()))
-def test_a_track_counts_all_that_its_own_measures_need(track: str) -> None:
+def test_a_track_counts_all_that_its_own_measures_need(track):
     """A measure in the report whose counts the kind does not name would never be counted."""
     kind = kind_of(track)
     needed = {one.counted for one in kind.report().measures if one.counted.sample is not None}
@@ -196,7 +194,7 @@ def show(kind: type[Counting]) -> None:
     registry.register_track(kind)
 
 
-def test_the_leading_measure_leads_everywhere(run: Run) -> None:
+def test_the_leading_measure_leads_everywhere(run):
     for kind, leading in ((Counting, ERROR), (led_by(EXACT, ERROR, EXACT), EXACT)):
         show(kind)
         assert comparable(run, "counting").measure == leading
@@ -209,7 +207,7 @@ def test_the_leading_measure_leads_everywhere(run: Run) -> None:
 
 
 @pytest.mark.usefixtures("run")
-def test_what_a_track_has_not_is_refused() -> None:
+def test_what_a_track_has_not_is_refused():
     with pytest.raises(SpecError, match="cannot be asked for as JSON"):
         call("run", "suite.yaml", "--set", "answer_format=json_schema", "--out", "json")
     with pytest.raises(SpecError, match="is a person, who cannot answer in counting"):
@@ -224,9 +222,7 @@ def is_right(_: Any, record: Any) -> tuple[float, float]:
     return record.answer.correct, 1
 
 
-def test_an_episode_that_would_have_asked_otherwise_is_no_longer_final(
-    here: Workspace, request: pytest.FixtureRequest
-) -> None:
+def test_an_episode_that_would_have_asked_otherwise_is_no_longer_final(here, request):
     here.write_suite(tracks=["step_planning"], steps={"physics": "off"}, levels=[3])
     assert not call("run", "suite.yaml", "--out", here.out, "--no-report")
     counted = SampleCounts("first_steps", ("placed", "n"), sample=first_is_placed)
@@ -252,9 +248,7 @@ def test_an_episode_that_would_have_asked_otherwise_is_no_longer_final(
         ("vqa", {"vqa": {"path": "./questions", "subtasks": ["SH"], "circular": True}}, is_right),
     ],
 )
-def test_scoring_again_counts_in_every_track(
-    here: Workspace, request: pytest.FixtureRequest, track: str, more: Any, counts: Any
-) -> None:
+def test_scoring_again_counts_in_every_track(here, request, track, more, counts):
     write_questions(here.root / "questions")
     here.write_suite(tracks=[track], models=["oracle", "random"], **more)
     folders = [here.root / name for name in ("out", "same", "new", "scored")]
@@ -279,9 +273,7 @@ def test_scoring_again_counts_in_every_track(
 @pytest.mark.parametrize(
     "other", [HALF, replace(HALF, name="other", counted=replace(SAMPLED, columns=("a", "b")))]
 )
-def test_two_measures_or_counts_of_one_name_are_refused(
-    other: Measure, request: pytest.FixtureRequest
-) -> None:
+def test_two_measures_or_counts_of_one_name_are_refused(other, request):
     registry.add_measure("full_planning", other)
     request.addfinalizer(lambda: registry.add_measure("full_planning", HALF))
     request.addfinalizer(lambda: registry.remove_measure("full_planning", other.name))

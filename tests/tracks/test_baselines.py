@@ -47,7 +47,7 @@ def question(
 ) -> Question:
     scene = Scene(f"s{number}", (2,), (), (f"base{number % 40}",))
     text = f"Which one is it, {WORDS[number % 6]} or not?"
-    return Question(f"{subtask.lower()}-{number}", subtask, scene, text, options, answer)  # type: ignore[arg-type]
+    return Question(f"{subtask.lower()}-{number}", subtask, scene, text, options, answer)
 
 
 def made_by(
@@ -94,25 +94,23 @@ def accuracy(learn: Any, questions: list[Question]) -> float:
 
 
 @pytest.mark.parametrize("learn", LEARNERS)
-def test_fair_questions_are_guessed_by_chance(learn: Any) -> None:
+def test_fair_questions_are_guessed_by_chance(learn):
     assert accuracy(learn, made_by(fair)) < 0.36
 
 
 @pytest.mark.parametrize("learn", LEARNERS)
-def test_an_answer_that_is_right_more_often_is_found(learn: Any) -> None:
+def test_an_answer_that_is_right_more_often_is_found(learn):
     assert accuracy(learn, made_by(cube_is_right)) == 1.0
 
 
 @pytest.mark.parametrize("rule", [largest_is_right, most_alike_is_right])
-def test_the_text_probe_finds_what_frequencies_do_not_tell(
-    rule: Callable[[np.random.Generator], tuple[list[str], int]],
-) -> None:
+def test_the_text_probe_finds_what_frequencies_do_not_tell(rule):
     questions = made_by(rule)
     assert accuracy(text_rule, questions) > 0.9
     assert accuracy(majority_rule, questions) < 0.5
 
 
-def test_what_is_learned_from_shares_no_base_scene_with_what_is_answered() -> None:
+def test_what_is_learned_from_shares_no_base_scene_with_what_is_answered():
     plain = made_by(fair, 120)
     found = [
         replace(one, scene=replace(one.scene, parents=(f"base{n % 40}", f"base{n * 7 % 40}")))
@@ -127,7 +125,7 @@ def test_what_is_learned_from_shares_no_base_scene_with_what_is_answered() -> No
         assert all(held_out.isdisjoint(question.scene.parents) for question in known)
 
 
-def test_letters_of_pictures_and_orders_go_by_frequency() -> None:
+def test_letters_of_pictures_and_orders_go_by_frequency():
     pictures = tuple(f"<img{i}>" for i in range(1, 5))
     questions = [question(n, pictures, (2,) if n % 3 else (0,)) for n in range(60)]
     orders = [question(n, pictures, (3, 1, 0, 2), "OR") for n in range(20)]
@@ -174,7 +172,7 @@ def drawn_sets(draw: st.DrawFn) -> tuple[list[Scene], dict[str, CandidateSet]]:
 
 @given(drawn_sets(), st.sampled_from(["A", "B"]), st.booleans())
 @settings(deadline=None, max_examples=25)
-def test_a_plan_names_candidates_of_its_set(drawn, setting: Setting, repeats: bool) -> None:
+def test_a_plan_names_candidates_of_its_set(drawn, setting, repeats):
     scenes, sets = drawn
     plans = goal_blind_plans(scenes, sets, setting, repeats=repeats)
     assert set(plans) == set(sets)
@@ -186,9 +184,7 @@ def test_a_plan_names_candidates_of_its_set(drawn, setting: Setting, repeats: bo
 
 @given(drawn_sets(), st.sampled_from(["A", "B"]), st.data())
 @settings(deadline=None, max_examples=25)
-def test_no_goal_has_a_part_in_what_is_learned_for_its_own_base_scene(
-    drawn, setting: Setting, data: st.DataObject
-) -> None:
+def test_no_goal_has_a_part_in_what_is_learned_for_its_own_base_scene(drawn, setting, data):
     """Another goal in place of a scene's own changes no chance in the scenes it is related to."""
     scenes, sets = drawn
     at = data.draw(st.integers(0, len(scenes) - 1))
@@ -206,7 +202,7 @@ def test_no_goal_has_a_part_in_what_is_learned_for_its_own_base_scene(
 
 
 @pytest.mark.parametrize("setting", ["A", "B"])
-def test_a_planted_tell_is_found(setting: Setting) -> None:
+def test_a_planted_tell_is_found(setting):
     rng = np.random.default_rng(3)
     scenes, sets = [], {}
     for number in range(40):
@@ -223,7 +219,7 @@ def test_a_planted_tell_is_found(setting: Setting) -> None:
 
 
 @pytest.mark.parametrize("setting", ["A", "B"])
-def test_areas_of_colors_tell_which_colors_are_needed(setting: Setting) -> None:
+def test_areas_of_colors_tell_which_colors_are_needed(setting):
     """The needed ones are all of a color that is drawn for each scene."""
     rng = np.random.default_rng(5)
     scenes, sets = [], {}
@@ -246,7 +242,7 @@ PICTURES = tuple(f"<img{n}>" for n in range(1, 5))
 
 
 @given(st.lists(st.integers(0, N - 1), min_size=1, max_size=99))
-def test_a_plan_is_read_as_it_was_picked(picks: list[int]) -> None:
+def test_a_plan_is_read_as_it_was_picked(picks):
     reply = pick_plan(PlanSubject(TASK.scene, TASK.candidates)).reply(list(map(Pick, picks)))
     steps = tuple(pick + 1 for pick in picks)
     assert parse_plan(reply, N).plan.steps == steps
@@ -254,7 +250,7 @@ def test_a_plan_is_read_as_it_was_picked(picks: list[int]) -> None:
 
 
 @pytest.mark.parametrize("pick", range(N + 1))
-def test_a_step_is_read_as_it_was_picked(pick: int) -> None:
+def test_a_step_is_read_as_it_was_picked(pick):
     picking = pick_step(StepSubject(TASK.scene, TASK.candidates))
     reply, wanted = picking.reply([Pick(pick)]), pick + 1 if pick < N else "Done"
     parsed = parse_move(reply)
@@ -262,9 +258,7 @@ def test_a_step_is_read_as_it_was_picked(pick: int) -> None:
 
 
 @given(st.permutations(range(4)), st.sampled_from([TEXTS, PICTURES]), st.booleans())
-def test_an_answer_is_read_as_it_was_picked(
-    order: list[int], options: tuple[str, ...], is_ordering: bool
-) -> None:
+def test_an_answer_is_read_as_it_was_picked(order, options, is_ordering):
     subtask = "OR" if is_ordering else "SH"
     question = Question("q", subtask, TASK.scene, "Which?", options, (0,))
     picks = order if is_ordering else order[:1]
@@ -283,7 +277,7 @@ CENTIMETERS = st.integers(-100_000, 100_000).map(lambda n: n / 100)
         max_size=100,
     )
 )
-def test_places_are_read_as_they_were_given(steps: list[tuple[int, tuple[float, ...]]]) -> None:
+def test_places_are_read_as_they_were_given(steps):
     picking = pick_poses(PlanSubject(TASK.scene, TASK.candidates))
     reply = picking.reply([Pick(pick, place) for pick, place in steps])
     read = parse_poses(reply, N).steps
@@ -303,7 +297,7 @@ def test_places_are_read_as_they_were_given(steps: list[tuple[int, tuple[float, 
         (10**400, 2, 3),
     ],
 )
-def test_numbers_that_are_lacking_or_not_allowed_are_refused(numbers: tuple[float, ...]) -> None:
+def test_numbers_that_are_lacking_or_not_allowed_are_refused(numbers):
     picking = pick_poses(PlanSubject(TASK.scene, TASK.candidates))
     with pytest.raises(ValueError, match=r"y within ±1000 cm with at most 2 decimals"):
         picking.reply([Pick(0, numbers)])
@@ -323,7 +317,7 @@ def picking(least: int = 1, most: int = 3, *, repeats: bool = False) -> Picking:
 
 @settings(max_examples=50)
 @given(st.lists(st.integers(-2, 6), max_size=5), st.booleans())
-def test_picks_that_make_no_answer_are_refused(picks: list[int], repeats: bool) -> None:
+def test_picks_that_make_no_answer_are_refused(picks, repeats):
     is_right = 1 <= len(picks) <= 3 and all(0 <= pick < 4 for pick in picks)
     is_right = is_right and (repeats or len(set(picks)) == len(picks))
     if is_right:
@@ -334,7 +328,7 @@ def test_picks_that_make_no_answer_are_refused(picks: list[int], repeats: bool) 
 
 
 @pytest.mark.parametrize("side", [128, 511, 1024])
-def test_candidates_are_clicked_where_the_grid_is_drawn(side: int) -> None:
+def test_candidates_are_clicked_where_the_grid_is_drawn(side):
     """Corners of cells, in pixels, in the composite and in the grid by itself."""
     for width, start in ((joined_size_px(side)[0], joined_size_px(side)[0] - side), (side, 0)):
         for cell in range(16):

@@ -39,9 +39,7 @@ def steps(*numbers: int) -> str:
         (None, (0, 0, 2)),
     ],
 )
-def test_a_reply_is_scored_under_every_setting_and_matcher(
-    track: Any, text: str | None, counts: tuple[int, int, int]
-) -> None:
+def test_a_reply_is_scored_under_every_setting_and_matcher(track, text, counts):
     scores = track.judge(track.items[0], text).fields["scores"]
     aov = [score for score in scores if score["criterion"] == "aov"]
     assert {(s["setting"], s["matcher"]) for s in aov} == {
@@ -53,7 +51,7 @@ def test_a_reply_is_scored_under_every_setting_and_matcher(
 
 
 @given(st.text(max_size=300) | st.lists(st.integers(-2, 20), max_size=8).map(lambda n: steps(*n)))
-def test_any_reply_is_judged_and_every_goal_block_accounted_for(track: Any, text: str) -> None:
+def test_any_reply_is_judged_and_every_goal_block_accounted_for(track, text):
     task = track.items[0]
     fields = track.judge(task, text).fields
     plan = fields["parse"]["plan"]
@@ -63,7 +61,7 @@ def test_any_reply_is_judged_and_every_goal_block_accounted_for(track: Any, text
     assert all(1 <= step <= len(task.candidates) for step in plan)
 
 
-def test_learned_plans_are_those_of_the_order_shown(tasks: tuple[AssemblyTask, ...]) -> None:
+def test_learned_plans_are_those_of_the_order_shown(tasks):
     track = track_of("full_planning", tasks, limit=2, candidates={"order": "shuffled"})
     for seed in (0, 7):
         shown = [presented(task, seed, "shuffled") for task in tasks]
@@ -78,7 +76,7 @@ def test_learned_plans_are_those_of_the_order_shown(tasks: tuple[AssemblyTask, .
 @pytest.mark.parametrize(
     ("name", "text"), [("full_planning", steps(1, 3, 2, 4)), ("vqa", "I see\na cube.\n\nAnswer: B")]
 )
-def test_a_reply_is_judged_in_ten_modules(name: str, text: str) -> None:
+def test_a_reply_is_judged_in_ten_modules(name, text):
     track, entered = track_of(name, limit=1), set[str]()
     sys.setprofile(lambda frame, *_: entered.add(frame.f_code.co_filename))
     try:
@@ -123,17 +121,13 @@ plans = st.lists(st.integers(-1, 9), max_size=10)
         ([5, 6, 7, 0, 99], (0, 0, 0, 0)),
     ],
 )
-def test_the_first_pose_named_of_a_kind_counts(
-    plan: list[int], counts: tuple[int, int, int, int]
-) -> None:
+def test_the_first_pose_named_of_a_kind_counts(plan, counts):
     task = AssemblyTask(SCENE, CANDIDATES)
     assert pose_counts(task, SimpleNamespace(parse=SimpleNamespace(plan=plan))) == counts
 
 
 @given(plans, st.permutations(range(1, 8)))
-def test_the_order_of_the_list_moves_choices_between_first_and_later_alone(
-    plan: list[int], order: list[int]
-) -> None:
+def test_the_order_of_the_list_moves_choices_between_first_and_later_alone(plan, order):
     shown = CandidateSet(tuple(CANDIDATES[number] for number in order))
     there = [order.index(n) + 1 if 1 <= n <= 7 else n for n in plan]
     here = sorted(is_right for _, is_right in pose_choices(SCENE, CANDIDATES, plan))

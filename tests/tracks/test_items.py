@@ -18,7 +18,7 @@ from phyblock.tracks.base import file_plan, in_order, presented, shown_order, sp
 from phyblock.tracks.difficulty import MEASURES, distractor_distance, log_orders
 from tests.shipped import TASKS
 from tests.tracks.opened import track_of
-from tests.workspace import Workspace, call
+from tests.workspace import call
 
 SIZES = st.lists(st.integers(1, 200), min_size=1, max_size=4)
 seeds = st.integers(0, 2**31 - 1)
@@ -26,7 +26,7 @@ plans = st.lists(st.integers(-1, 18), max_size=8)
 
 
 @given(SIZES, st.integers(1, 900))
-def test_shares_are_as_near_to_proportional_as_can_be(sizes: list[int], limit: int) -> None:
+def test_shares_are_as_near_to_proportional_as_can_be(sizes, limit):
     """Webster's law: moving a place from one group to another never brings them nearer. Groups
     with their first place alone hold it whatever their size, and a higher limit takes from none.
     """
@@ -42,7 +42,7 @@ def test_shares_are_as_near_to_proportional_as_can_be(sizes: list[int], limit: i
 
 
 @given(st.integers(1, 300), st.data())
-def test_the_first_positions_are_spread(size: int, data: st.DataObject) -> None:
+def test_the_first_positions_are_spread(size, data):
     share = data.draw(st.integers(1, size))
     kept = sorted(spread(size)[:share])
     assert len(set(kept)) == share
@@ -50,9 +50,7 @@ def test_the_first_positions_are_spread(size: int, data: st.DataObject) -> None:
 
 
 @given(seeds)
-def test_an_order_has_every_candidate_once_and_is_that_of_scene_and_seed(
-    tasks: tuple[AssemblyTask, ...], seed: int
-) -> None:
+def test_an_order_has_every_candidate_once_and_is_that_of_scene_and_seed(tasks, seed):
     orders = [shown_order(task, seed) for task in tasks]
     for task, order in zip(tasks, orders, strict=True):
         assert sorted(order) == list(range(1, len(task.candidates) + 1))
@@ -63,7 +61,7 @@ def test_an_order_has_every_candidate_once_and_is_that_of_scene_and_seed(
     assert len(set(orders)) == len(orders)
 
 
-def test_orders_stay_as_they_were_drawn(tasks: tuple[AssemblyTask, ...]) -> None:
+def test_orders_stay_as_they_were_drawn(tasks):
     """Stored plans are read by them."""
     assert shown_order(tasks[0], 0)[:6] == (5, 9, 7, 4, 2, 11)
     assert shown_order(tasks[0], 1)[:6] == (14, 12, 15, 11, 13, 10)
@@ -73,9 +71,7 @@ def test_orders_stay_as_they_were_drawn(tasks: tuple[AssemblyTask, ...]) -> None
 
 
 @given(st.integers(0, 4), seeds, plans)
-def test_a_plan_is_worth_the_same_in_either_numbering(
-    tasks: tuple[AssemblyTask, ...], place: int, seed: int, plan: list[int]
-) -> None:
+def test_a_plan_is_worth_the_same_in_either_numbering(tasks, place, seed, plan):
     def text(steps: Any) -> str:
         return "\n".join(f"Step{i}: Move block with index {n}" for i, n in enumerate(steps, 1))
 
@@ -102,9 +98,7 @@ def _track(name: str) -> Any:
 
 @given(st.integers(0, 4), seeds, st.lists(st.integers(-1, 18), max_size=5))
 @settings(deadline=None)
-def test_an_episode_goes_the_same_in_either_numbering(
-    tasks: tuple[AssemblyTask, ...], place: int, seed: int, moves: list[int]
-) -> None:
+def test_an_episode_goes_the_same_in_either_numbering(tasks, place, seed, moves):
     async def play(task: AssemblyTask, steps: Any) -> dict[str, Any]:
         episode = _track("step_planning").start(task, 0, {}, with_messages=False)
         for step in steps:
@@ -121,7 +115,7 @@ def test_an_episode_goes_the_same_in_either_numbering(
     assert list(here["parse"]["file_plan"]) == there["parse"]["plan"]
 
 
-def test_a_plain_presentation_changes_nothing(tasks: tuple[AssemblyTask, ...]) -> None:
+def test_a_plain_presentation_changes_nothing(tasks):
     assert all(presented(task, 5, "file") is task for task in tasks)
     assert file_plan(tasks[0], [1, 2]) is None
     assert track_of("full_planning", tasks, seeds=[0, 1]).about(tasks[0]) == {}
@@ -139,14 +133,14 @@ def graphs(draw: st.DrawFn) -> AOVGraph:
 
 
 @given(graphs())
-def test_there_are_as_many_orders_as_is_said_or_more(graph: AOVGraph) -> None:
+def test_there_are_as_many_orders_as_is_said_or_more(graph):
     orders = sum(graph.is_valid(order) for order in permutations(range(len(graph))))
     assert 0 <= log_orders(graph) <= math.log10(orders) + 1e-9 or math.isclose(orders, 1)
     if all(len(below) < 2 for below in graph.depends_on):
         assert log_orders(graph) == pytest.approx(math.log10(orders), abs=1e-9)
 
 
-def test_numbers_are_within_their_bounds_and_tell_scenes_apart() -> None:
+def test_numbers_are_within_their_bounds_and_tell_scenes_apart():
     for task in TASKS[::9]:
         numbers = {name: measure(task) for name, measure in MEASURES.items()}
         assert 0 < numbers["blind"] < 1
@@ -162,7 +156,7 @@ def test_numbers_are_within_their_bounds_and_tell_scenes_apart() -> None:
     assert distractor_distance(alone) == 3
 
 
-def test_a_suite_asks_about_scenes_within_its_ranges(workspace: Workspace) -> None:
+def test_a_suite_asks_about_scenes_within_its_ranges(workspace):
     suite = {"dataset": {"path": "phyblock-400", "difficulty": {"blocks": [20, 22]}}}
     path = workspace.write_suite(models=["random"], **suite)
     assert call("run", path, "--out", workspace.out, "--no-report") == 0

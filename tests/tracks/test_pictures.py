@@ -7,7 +7,6 @@ import io
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 from PIL import Image as PillowImage
@@ -53,9 +52,7 @@ def opened(image: Image) -> PillowImage.Image:
         return picture.convert("RGB")
 
 
-def test_a_picture_is_drawn_once_however_often_and_by_whomever_it_is_asked_for(
-    tasks: tuple[AssemblyTask, ...], tmp_path: Path
-) -> None:
+def test_a_picture_is_drawn_once_however_often_and_by_whomever_it_is_asked_for(tasks, tmp_path):
     tasks = tasks[:2]
     first, drawn = draw(tmp_path, COMPOSITE, [*tasks, *tasks, *tasks])
     assert drawn == 2
@@ -70,9 +67,7 @@ def test_a_picture_is_drawn_once_however_often_and_by_whomever_it_is_asked_for(
     assert not list(tmp_path.rglob("*.part"))
 
 
-def test_an_outline_draws_nothing_and_has_the_real_sizes(
-    tasks: tuple[AssemblyTask, ...], tmp_path: Path
-) -> None:
+def test_an_outline_draws_nothing_and_has_the_real_sizes(tasks, tmp_path):
     for images in (COMPOSITE, GOAL_FIRST):
         shop = Workshop(1, tmp_path / images.layout)
         drawings = scene_drawings(tasks[0], images)
@@ -84,7 +79,7 @@ def test_an_outline_draws_nothing_and_has_the_real_sizes(
         assert shop.rendered == 0
 
 
-def test_keys_follow_content_and_style_alone(tasks: tuple[AssemblyTask, ...]) -> None:
+def test_keys_follow_content_and_style_alone(tasks):
     larger = ImagesSpec(size_px=256)
     every = (COMPOSITE, larger, GOAL_FIRST, GOAL_LAST)
     assert len({tuple(keys(images, task)) for images in every for task in tasks[:2]}) == 8
@@ -92,9 +87,7 @@ def test_keys_follow_content_and_style_alone(tasks: tuple[AssemblyTask, ...]) ->
 
 
 @pytest.mark.parametrize("layout", ["separate", "composite"])
-def test_pictures_follow_what_is_shown(
-    tasks: tuple[AssemblyTask, ...], layout: Any, shop: Workshop
-) -> None:
+def test_pictures_follow_what_is_shown(tasks, layout, shop):
     images = ImagesSpec(size_px=128, layout=layout)
     style = picture_style(images)
 
@@ -125,8 +118,8 @@ def composite_task(tasks: tuple[AssemblyTask, ...], tmp_path: Path) -> AssemblyT
 
 @pytest.mark.parametrize("order", [("goal", "candidates"), ("candidates", "goal")])
 def test_the_data_sets_picture_is_sent_byte_for_byte_or_parted_in_two_halves(
-    composite_task: AssemblyTask, tmp_path: Path, order: Any
-) -> None:
+    composite_task, tmp_path, order
+):
     assert composite_task.composite is not None
     (((picture,),), drawn) = draw(tmp_path / "cache", OWN, [composite_task])
     assert picture.data == composite_task.composite.read_bytes()
@@ -144,7 +137,7 @@ def test_the_data_sets_picture_is_sent_byte_for_byte_or_parted_in_two_halves(
         draw(tmp_path, OWN, [replace(composite_task, composite=None)])
 
 
-def test_pictures_of_the_data_set_can_leave_out_the_goal(official_checkout: Path) -> None:
+def test_pictures_of_the_data_set_can_leave_out_the_goal(official_checkout):
     pool = [one for one in official_tasks(official_checkout) if one.composite is not None]
     task = pool[0]
     blind = presented(task, 0, "file", is_blind=True)
@@ -158,9 +151,7 @@ def test_pictures_of_the_data_set_can_leave_out_the_goal(official_checkout: Path
 
 
 @pytest.mark.parametrize("size", [(30_000, 30_000), (1, 1), (0, 9)])
-def test_what_is_no_picture_in_the_cache_is_drawn_anew(
-    tasks: tuple[AssemblyTask, ...], tmp_path: Path, size: tuple[int, int]
-) -> None:
+def test_what_is_no_picture_in_the_cache_is_drawn_anew(tasks, tmp_path, size):
     (key,) = keys(COMPOSITE, tasks[0])
     (tmp_path / key[:2]).mkdir()
     (tmp_path / key[:2] / f"{key}.png").write_bytes(png_header(*size))
@@ -168,9 +159,7 @@ def test_what_is_no_picture_in_the_cache_is_drawn_anew(
     assert outline.data == b""
 
 
-def test_a_cache_that_cannot_be_written_is_said_so(
-    tasks: tuple[AssemblyTask, ...], tmp_path: Path
-) -> None:
+def test_a_cache_that_cannot_be_written_is_said_so(tasks, tmp_path):
     taken = tmp_path / "taken"
     taken.write_text("mine", encoding="utf-8")
     with pytest.raises(StoreError, match="PHYBLOCK_CACHE"):

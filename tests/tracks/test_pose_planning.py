@@ -29,11 +29,11 @@ from phyblock.sim.geometry import center_cm, origin_m, put
 from phyblock.tracks import pose_planning as pose_track
 from phyblock.tracks.full_planning import PlanSubject
 from phyblock.tracks.pose_planning import POSE_RULES, PosePlanning, PoseRecord, StepOutcome, written
-from phyblock.types import REFUSED_ENDS, STEP_ENDS, StepEnd
+from phyblock.types import REFUSED_ENDS, STEP_ENDS
 from tests.shipped import TASKS
 from tests.sim.structures import block_types, eulers
 from tests.tracks.opened import track_of
-from tests.workspace import Workspace, call
+from tests.workspace import call
 
 STANDS = "Step1: block 1 at (0, 0, 2.5)\nStep2: block 3 at (0, 0, 7.5)"
 
@@ -58,9 +58,7 @@ def built_in() -> list[AssemblyTask]:
 
 
 @given(block_types, eulers, st.tuples(*[st.floats(-1, 1)] * 3))
-def test_a_block_is_put_where_its_box_is_said_to_be(
-    name: Any, euler_deg: Any, place_m: tuple[float, float, float]
-) -> None:
+def test_a_block_is_put_where_its_box_is_said_to_be(name, euler_deg, place_m):
     block = Block(1, name, "red", place_m, euler_deg, (), 1)
     kept = CandidateSet((Candidate(name, "red", euler_deg),))
     found = put(PoseStep(1, center_cm(block)), kept)
@@ -70,9 +68,7 @@ def test_a_block_is_put_where_its_box_is_said_to_be(
     assert put(PoseStep(2, (0, 0, 0)), kept) is None
 
 
-def test_true_poses_in_a_random_valid_order_are_right_and_stand(
-    built_in: list[AssemblyTask],
-) -> None:
+def test_true_poses_in_a_random_valid_order_are_right_and_stand(built_in):
     track = poses()
     for seed, item in enumerate(built_in):
         shown = track.shown(item, seed)
@@ -107,14 +103,7 @@ def test_true_poses_in_a_random_valid_order_are_right_and_stand(
         (None, (0, 0, 0, 0), [], [], 0),
     ],
 )  # fmt: skip
-def test_a_reply_is_read_scored_and_carried_out(
-    task: AssemblyTask,
-    text: str | None,
-    right: tuple[int, ...],
-    ends: list[str],
-    errors: list[str | None],
-    reached: int,
-) -> None:
+def test_a_reply_is_read_scored_and_carried_out(task, text, right, ends, errors, reached):
     track = poses()
     found = track.judge(task, text)
     pose = found.fields["pose"]
@@ -148,9 +137,7 @@ def worlds_of(put: Sequence[Block | None], steps: Sequence[StepOutcome]) -> list
 
 
 @pytest.mark.parametrize("baseline", ["oracle-noise-1cm", "stack", "oracle-2d"])
-def test_where_blocks_came_to_lie_follows_from_what_each_step_moved(
-    built_in: list[AssemblyTask], baseline: str
-) -> None:
+def test_where_blocks_came_to_lie_follows_from_what_each_step_moved(built_in, baseline):
     item = built_in[0]
     track = poses()
     subject = PlanSubject(item.scene, item.candidates)
@@ -172,9 +159,7 @@ def test_where_blocks_came_to_lie_follows_from_what_each_step_moved(
 
 @settings(max_examples=12, deadline=None)
 @given(st.lists(st.sampled_from([1, 1, 3, 3, 2, 17, 0]), max_size=4))
-def test_without_poses_a_plan_is_scored_as_full_planning_scores_it(
-    task: AssemblyTask, numbers: list[int]
-) -> None:
+def test_without_poses_a_plan_is_scored_as_full_planning_scores_it(task, numbers):
     """Far from one another, so that nothing falls on anything."""
     steps = [PoseStep(n, (20.0 * place, 0.0, 2.5)) for place, n in enumerate(numbers)]
     plain = "\n".join(f"Step{i}: Move block with index {n}" for i, n in enumerate(numbers, 1))
@@ -199,9 +184,7 @@ def fit(position_cm: float, up_cm: float, turn_deg: float = 0.0) -> PoseFit:
         (fit(3, 1, 16), "wrong_rotation"),
     ],
 )
-def test_a_step_has_one_error_the_first_in_time(
-    task: AssemblyTask, one: PoseFit, error: str | None, end: StepEnd
-) -> None:
+def test_a_step_has_one_error_the_first_in_time(task, one, error, end):
     """Errors of a reply come before those of its execution."""
     goal = Goal(task.scene, task.candidates, "A")
     physical = {"stands": None, "falls": "floating", "knocks_over": "toppling"}
@@ -212,8 +195,8 @@ def test_a_step_has_one_error_the_first_in_time(
 
 
 def test_a_run_that_was_cut_goes_on_and_is_scored_again_without_an_engine(
-    inside: Workspace, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+    inside, monkeypatch, capsys
+):
     workspace = inside
     section, models = {"views": ["oblique"]}, ["oracle", "oracle-2d"]
     workspace.write_suite(tracks=["pose_planning"], models=models, pose=section)
@@ -255,7 +238,7 @@ def test_a_run_that_was_cut_goes_on_and_is_scored_again_without_an_engine(
         (["oblique", "oblique"], "is listed twice"),
     ],
 )
-def test_a_view_that_is_none_or_cannot_carry_the_sheet_is_said(views: list[str], told: str) -> None:
+def test_a_view_that_is_none_or_cannot_carry_the_sheet_is_said(views, told):
     with pytest.raises(SpecError) as caught:
         track_of("pose_planning", pose={"views": views})
     (problem,) = caught.value.problems

@@ -30,9 +30,7 @@ def prompt(folder: Path, body: str, **files: str) -> TemplatePrompt:
     return TemplatePrompt(folder / "mine.j2", "mine")
 
 
-def test_blocks_become_messages_with_captioned_pictures_before_the_user_text(
-    tmp_path: Path,
-) -> None:
+def test_blocks_become_messages_with_captioned_pictures_before_the_user_text(tmp_path):
     blocks = "{% block system %} Be short. {% endblock %} not sent "
     blocks += "{% block caption %}{{ number }}. {{ label }}{% endblock %}"
     user = "{% block user %}\n{{ n_candidates }}{% block mine %}!{% endblock %}\n{% endblock %}"
@@ -58,7 +56,7 @@ def test_blocks_become_messages_with_captioned_pictures_before_the_user_text(
         ("{% for p in pictures %}{{ loop.index }} {{ p }};{% endfor %}", "1 goal;2 candidates;"),
     ],
 )
-def test_parts_are_included_and_imported(tmp_path: Path, body: str, said: str) -> None:
+def test_parts_are_included_and_imported(tmp_path, body, said):
     files = {"rules": "of {{ n_candidates }}", "outer": "({% include 'rules.j2' %})"}
     made = prompt(tmp_path, body, macros=MACROS, **files)
     for name in (*files, "macros"):
@@ -69,9 +67,7 @@ def test_parts_are_included_and_imported(tmp_path: Path, body: str, said: str) -
 
 @given(first=st.text("ab", max_size=3), second=st.text("ab", max_size=3))
 @settings(max_examples=15, deadline=None)
-def test_an_edit_of_what_is_included_is_another_prompt(
-    tmp_path_factory: pytest.TempPathFactory, first: str, second: str
-) -> None:
+def test_an_edit_of_what_is_included_is_another_prompt(tmp_path_factory, first, second):
     versions = [
         prompt(
             tmp_path_factory.mktemp("prompts"),
@@ -116,9 +112,7 @@ def test_an_edit_of_what_is_included_is_another_prompt(
         ("{{ 0x" + "f" * 10_000 + " }}", "", "mine.j2", "is not valid Jinja"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_is_said_with_file_and_line(
-    tmp_path: Path, body: str, part: str, where: str, said: str
-) -> None:
+def test_what_is_wrong_is_said_with_file_and_line(tmp_path, body, part, where, said):
     (tmp_path / "secret.txt").write_text("secret", encoding="utf-8")
     folder = tmp_path / "prompts"
     folder.mkdir()
@@ -135,9 +129,7 @@ def test_what_is_wrong_is_said_with_file_and_line(
 
 @settings(deadline=None, max_examples=40)
 @given(TEMPLATES)
-def test_any_bytes_are_a_prompt_or_a_prompt_error(
-    tmp_path_factory: pytest.TempPathFactory, data: bytes
-) -> None:
+def test_any_bytes_are_a_prompt_or_a_prompt_error(tmp_path_factory, data):
     path = tmp_path_factory.getbasetemp() / "law.j2"
     path.write_bytes(data)
     with contextlib.suppress(PromptError):
@@ -145,7 +137,7 @@ def test_any_bytes_are_a_prompt_or_a_prompt_error(
         assert isinstance(message, Message)
 
 
-def test_the_official_prompt_is_the_recorded_text_to_the_letter(official_checkout: Path) -> None:
+def test_the_official_prompt_is_the_recorded_text_to_the_letter(official_checkout):
     text = official_prompt(official_checkout)
     sent = OfficialPrompt(text).messages((GOAL, GRID), FACTS)
     assert sent == (Message("user", (GOAL, GRID, text)),)

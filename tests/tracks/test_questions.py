@@ -83,7 +83,7 @@ def text_of(request: Request) -> str:
     return last
 
 
-def test_the_answer_stands_in_no_message(question_set: QuestionSet, shop: Workshop) -> None:
+def test_the_answer_stands_in_no_message(question_set, shop):
     """Questions that differ in the right answer alone are asked alike."""
     turned = [
         replace(task, question=replace(task.question, answer=_other(task.question.answer)))
@@ -100,9 +100,7 @@ def _other(answer: tuple[int, ...]) -> tuple[int, ...]:
 
 
 @given(first=st.integers(0, 3), second=st.integers(0, 3), data=st.data())
-def test_a_rotation_keeps_what_is_right_and_rotations_add_up(
-    question_set: QuestionSet, first: int, second: int, data: st.DataObject
-) -> None:
+def test_a_rotation_keeps_what_is_right_and_rotations_add_up(question_set, first, second, data):
     question = data.draw(st.sampled_from(question_set.tasks)).question
     turned = rotated(question, first)
     for before, after in zip(question.answer, turned.answer, strict=True):
@@ -123,9 +121,7 @@ def _meaning(question: Question, index: int) -> object:
     return question.options[index]
 
 
-def test_questions_keep_their_background_unless_a_suite_gives_one(
-    question_set: QuestionSet,
-) -> None:
+def test_questions_keep_their_background_unless_a_suite_gives_one(question_set):
     asked = next(task.question for task in question_set.tasks if task.key == "vp-000")
     lawn = replace(asked, pictures=tuple(replace(p, background="lawn") for p in asked.pictures))
     bare = [replace(picture, background=None) for picture in asked.pictures]
@@ -137,11 +133,11 @@ def test_questions_keep_their_background_unless_a_suite_gives_one(
     ):
         style = replace(STYLE, background=drawn)
         item = AskedQuestion(QuestionTask(question))
-        drawn = question_drawings(item, STYLE, ground)  # type: ignore[arg-type]
+        drawn = question_drawings(item, STYLE, ground)
         assert [one.key for one in drawn] == [question_key(picture, style) for picture in bare]
 
 
-def test_a_reply_that_cannot_be_read_is_wrong(question_set: QuestionSet) -> None:
+def test_a_reply_that_cannot_be_read_is_wrong(question_set):
     track = opened(question_set, None)
     for item, text in itertools.product(track.items[:3], (None, "I cannot tell.")):
         bad, right = track.judge(item, text), item.question.answer_letters
@@ -149,7 +145,7 @@ def test_a_reply_that_cannot_be_read_is_wrong(question_set: QuestionSet) -> None
         assert bad.fields["answer"] == {"right": right, "given": None, "correct": False}
 
 
-def test_random_answers_are_spread_over_all_that_can_be_given(question_set: QuestionSet) -> None:
+def test_random_answers_are_spread_over_all_that_can_be_given(question_set):
     rng, found = np.random.default_rng(0), {}
     for item in opened(question_set, None).items:
         subject = ChoiceSubject(item.question, lambda: (0,))
@@ -171,12 +167,7 @@ some = st.lists(st.sampled_from(SUBTASKS[:7]), min_size=1, unique=True)
 
 
 @given(tasks, some, st.none() | st.integers(1, 5), st.none() | st.integers(1, 40))
-def test_no_more_than_wanted_of_each_and_in_all(
-    given_tasks: list[QuestionTask],
-    subtasks: list[Subtask],
-    per_subtask: int | None,
-    limit: int | None,
-) -> None:
+def test_no_more_than_wanted_of_each_and_in_all(given_tasks, subtasks, per_subtask, limit):
     chosen = select_questions(given_tasks, subtasks, LEVELS, per_subtask, limit)
     found = Counter(one.question.subtask for one in given_tasks)
     counts = Counter(one.question.subtask for one in chosen)
@@ -188,9 +179,7 @@ def test_no_more_than_wanted_of_each_and_in_all(
 
 
 @given(tasks, some, st.integers(1, 5), st.integers(1, 40))
-def test_a_higher_limit_asks_all_that_a_lower_one_asks(
-    given_tasks: list[QuestionTask], subtasks: list[Subtask], per_subtask: int, limit: int
-) -> None:
+def test_a_higher_limit_asks_all_that_a_lower_one_asks(given_tasks, subtasks, per_subtask, limit):
     def keys(most_of_each: int | None, most: int | None) -> set[str]:
         kept = select_questions(given_tasks, subtasks, LEVELS, most_of_each, most)
         return {task.key for task in kept}

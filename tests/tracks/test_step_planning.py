@@ -7,8 +7,7 @@ import functools
 import json
 import re
 import zlib
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any, get_args
 
 import numpy as np
@@ -48,10 +47,10 @@ def _made(form: str, shop: Workshop | None, steps: str) -> Any:
 def tower(*colors: str) -> AssemblyTask:
     """Cubes one on another; candidates are five colors of cube, and a red arch that is no use."""
     blocks = tuple(
-        Block(i, "cube", c, (0, 0, 0.05 * i - 0.025), (0, 0, 0), (i - 1,) if i > 1 else (), i)  # type: ignore[arg-type]
+        Block(i, "cube", c, (0, 0, 0.05 * i - 0.025), (0, 0, 0), (i - 1,) if i > 1 else (), i)
         for i, c in enumerate(colors, 1)
     )
-    cubes = [Candidate("cube", c, (0, 0, 0)) for c in ("red", "yellow", "blue", "green", "orange")]  # type: ignore[arg-type]
+    cubes = [Candidate("cube", c, (0, 0, 0)) for c in ("red", "yellow", "blue", "green", "orange")]
     arch = Candidate("arch", "red", (0, 0, 0))
     return AssemblyTask(Scene("tower", (3,), blocks, ("tower",)), CandidateSet((*cubes, arch)))
 
@@ -97,7 +96,7 @@ def scores(fields: dict[str, Any], criterion: str, setting: Setting = "A") -> tu
     return found["tp"], found["fp"], found["fn"]
 
 
-def test_each_reply_has_its_outcome() -> None:
+def test_each_reply_has_its_outcome():
     fields, requests = play(
         tower("red", "blue", "red"),
         scripted(
@@ -121,7 +120,7 @@ def test_each_reply_has_its_outcome() -> None:
 
 
 @given(st.lists(st.sampled_from([*(f"Move({n})" for n in range(1, 7)), "Done"]), max_size=8))
-def test_an_episode_goes_the_same_way_in_json(operations: list[str]) -> None:
+def test_an_episode_goes_the_same_way_in_json(operations):
     task = tower("red", "blue", "red")
     text, asked = (made(form, **OPEN) for form in ("text", "json_schema"))
     form = asked.form(task)
@@ -157,14 +156,12 @@ def test_an_episode_goes_the_same_way_in_json(operations: list[str]) -> None:
         ({"max_steps": 3}, scripted("Move(1)", "Move(1)", "Move(3)"), "completed", 3),
     ],
 )  # fmt: skip
-def test_limits_end_an_episode(
-    limits: dict[str, Any], agent: Agent, ending: str, steps: int
-) -> None:
+def test_limits_end_an_episode(limits, agent, ending, steps):
     fields, _ = play(tower("red", "red", "blue"), agent, made(**limits))
     assert (fields["ending"], len(fields["outcomes"])) == (ending, steps)
 
 
-def test_no_hostile_reply_stops_an_episode() -> None:
+def test_no_hostile_reply_stops_an_episode():
     """Each of them has its named outcome, and what follows is played as if it had not been."""
     allowed = {*MOVE_OUTCOMES, *MOVE_PROBLEMS, "done"}
     for text, _ in REPLIES:
@@ -177,7 +174,7 @@ def test_no_hostile_reply_stops_an_episode() -> None:
 
 @settings(deadline=None)
 @given(st.lists(st.sampled_from(["Move(1)", "Move(3)", "Move(6)", "?", "Move(40)"]), max_size=60))
-def test_whatever_is_said_the_default_limits_end_it_the_same_way(texts: list[str]) -> None:
+def test_whatever_is_said_the_default_limits_end_it_the_same_way(texts):
     task = tower("red", "blue", "red", "blue")
     fields, requests = play(task, scripted(*texts), made(), seed=3)
     assert play(task, scripted(*texts), made(), seed=3) == (fields, requests)
@@ -190,7 +187,7 @@ def test_whatever_is_said_the_default_limits_end_it_the_same_way(texts: list[str
 
 
 @pytest.mark.parametrize("accepts", SETTINGS)
-def test_the_oracle_completes_every_built_in_scene(accepts: Setting) -> None:
+def test_the_oracle_completes_every_built_in_scene(accepts):
     """Also where orientations do not matter to the simulator, it makes no mistake in them."""
     for task in TASKS:
         fields, _ = play(task, baseline("oracle"), made(setting=accepts))
@@ -199,21 +196,21 @@ def test_the_oracle_completes_every_built_in_scene(accepts: Setting) -> None:
             assert scores(fields, "attempted", setting) == (len(task.scene), 0, 0), task.scene.id
 
 
-def test_the_oracle_completes_every_official_scene(official_checkout: Path) -> None:
+def test_the_oracle_completes_every_official_scene(official_checkout):
     for task in official_tasks(official_checkout):
         fields, _ = play(task, baseline("oracle"), made())
         assert fields["ending"] == "completed", task.scene.id
         assert scores(fields, "attempted") == (len(task.scene), 0, 0)
 
 
-def test_a_turned_block_is_placed_in_b_and_wrong_in_a() -> None:
+def test_a_turned_block_is_placed_in_b_and_wrong_in_a():
     """The oracle without orientation: what setting B lets pass is counted in setting A."""
     blocks = (
         Block(1, "arch", "red", (0, 0, 0.025), (0, 0, 0), (), 1),
         Block(2, "cube", "red", (0, 0, 0.075), (0, 0, 0), (1,), 2),
     )
     looks = [("arch", 0), ("arch", 90), ("cube", 0)]
-    numbered = tuple(Candidate(t, "red", (0, 0, turn)) for t, turn in looks)  # type: ignore[arg-type]
+    numbered = tuple(Candidate(t, "red", (0, 0, turn)) for t, turn in looks)
     task = AssemblyTask(Scene("s", (2,), blocks, ("s",)), CandidateSet(numbered))
     agent = baseline("oracle-no-orientation")
     in_b, _ = play(task, agent, made(setting="B"))
@@ -230,9 +227,7 @@ def test_a_turned_block_is_placed_in_b_and_wrong_in_a() -> None:
     [("off", "completed", (3, 0, 0), [None] * 3), ("settle", "completed", (3, 0, 0), [[], [3], []]),
      ("strict", "collapsed", (1, 1, 2), [[], [3]])],
 )  # fmt: skip
-def test_a_collapse_ends_an_episode_under_strict_physics_alone(
-    physics: str, ending: str, placed: tuple[int, int, int], fallen: list[Any]
-) -> None:
+def test_a_collapse_ends_an_episode_under_strict_physics_alone(physics, ending, placed, fallen):
     track = made(physics=physics, **OPEN)
     fields, _ = play(seesaw(), scripted("Move(1)", "Move(3)", "Move(2)"), track)
     assert (fields["ending"], scores(fields, "placed")) == (ending, placed)
@@ -247,9 +242,7 @@ def test_a_collapse_ends_an_episode_under_strict_physics_alone(
     st.integers(1, 4),
     st.integers(1, 4),
 )
-def test_runs_of_failures_end_an_episode(
-    moves: Sequence[int | None], most_failures: int, most_repeats: int
-) -> None:
+def test_runs_of_failures_end_an_episode(moves, most_failures, most_repeats):
     """A move is named over and over until one of both limits is reached, as counted by hand."""
     track = made(max_failures=most_failures, max_repeats=most_repeats, max_steps=99)
     said = scripted(*("?" if move is None else f"Move({move})" for move in [*moves, *[6] * 4]))
@@ -266,13 +259,13 @@ def test_runs_of_failures_end_an_episode(
     assert fields["ending"] in (wanted, "completed")
 
 
-def test_outlines_are_as_many_as_an_episode_can_have() -> None:
+def test_outlines_are_as_many_as_an_episode_can_have():
     task, rules = tower("red", "blue"), ({}, {"max_steps": 1})
     assert [len(list(made(**one).outlines(task))) for one in rules] == [4, 1]
 
 
 def past(*outcomes: str) -> list[PastStep]:
-    return [PastStep(f"Move({n})", outcome, n) for n, outcome in enumerate(outcomes, 1)]  # type: ignore[arg-type]
+    return [PastStep(f"Move({n})", outcome, n) for n, outcome in enumerate(outcomes, 1)]
 
 
 def text(message: Message) -> str:
@@ -284,7 +277,7 @@ def pictures(message: Message) -> list[bytes]:
 
 
 @pytest.mark.parametrize("n", [0, 1, 7])
-def test_every_earlier_step_is_told_and_the_state_is_seen_last(shop: Workshop, n: int) -> None:
+def test_every_earlier_step_is_told_and_the_state_is_seen_last(shop, n):
     shown = [Image(name.encode(), name, 1, 1) for name in ("goal", "candidates", "current")]
     messages = made(shop=shop).messages(tower(*["red"] * 4), shown, past(*["overflow"] * n))
     assert [message.role for message in messages] == ["system", "user"]
@@ -295,7 +288,7 @@ def test_every_earlier_step_is_told_and_the_state_is_seen_last(shop: Workshop, n
 
 
 @pytest.mark.parametrize("feedback", get_args(Feedback))
-def test_feedback_tells_no_more_than_it_may(feedback: Feedback) -> None:
+def test_feedback_tells_no_more_than_it_may(feedback):
     outcomes = [*MOVE_OUTCOMES, *MOVE_PROBLEMS]
     told = {outcome: past(outcome)[0].report(feedback) for outcome in outcomes}
     if feedback == "none":
@@ -308,7 +301,7 @@ def test_feedback_tells_no_more_than_it_may(feedback: Feedback) -> None:
     assert told["no_move"] == "it failed, no operation could be read"
 
 
-def test_pictures_of_states_are_drawn_and_kept(tmp_path: Path) -> None:
+def test_pictures_of_states_are_drawn_and_kept(tmp_path):
     """An episode sees one picture a state; a second episode finds them all."""
 
     async def play(track: StepPlanning, task: AssemblyTask) -> list[list[bytes]]:
@@ -316,7 +309,7 @@ def test_pictures_of_states_are_drawn_and_kept(tmp_path: Path) -> None:
         seen = []
         while (request := await episode.request()) is not None:
             seen.append(pictures(request.messages[1]))
-            move = request.subject.valid[0]  # type: ignore[attr-defined]
+            move = request.subject.valid[0]
             episode.take(Reply(text=f"Move({move})"))
         return seen
 

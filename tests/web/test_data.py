@@ -67,9 +67,7 @@ class Report:
 
 @laws
 @given(st.lists(JSON, max_size=6))
-def test_what_is_packed_comes_back(
-    tmp_path_factory: pytest.TempPathFactory, entries: list[Any]
-) -> None:
+def test_what_is_packed_comes_back(tmp_path_factory, entries):
     folder = tmp_path_factory.mktemp("pack")
     made = Pack(folder, "records", "build")
     assert [made.add(entry) for entry in entries] == list(range(len(entries)))
@@ -79,9 +77,7 @@ def test_what_is_packed_comes_back(
 
 @laws
 @given(record_lists(), st.randoms(use_true_random=False))
-def test_the_newest_record_of_every_sample_is_there_once(
-    tmp_path_factory: pytest.TempPathFactory, records: list[dict[str, Any]], random: Any
-) -> None:
+def test_the_newest_record_of_every_sample_is_there_once(tmp_path_factory, records, random):
     folder = tmp_path_factory.mktemp("run")
     facts = manifest()
     stale = [
@@ -108,7 +104,7 @@ def test_the_newest_record_of_every_sample_is_there_once(
         assert rows["score"][row] in (round(200 * tp / whole, 1) if whole else None, None)
 
 
-def test_every_text_of_the_page_is_escaped_and_only_our_script_may_run(tmp_path: Path) -> None:
+def test_every_text_of_the_page_is_escaped_and_only_our_script_may_run(tmp_path):
     hostile = "<script>alert(1)</script><img src=x onerror=alert(2)>\"'&"
     facts = manifest(models=[hostile])
     facts["suite"] |= {"models": ["alpha"], "description": hostile}
@@ -124,7 +120,7 @@ def test_every_text_of_the_page_is_escaped_and_only_our_script_may_run(tmp_path:
     assert not re.search(r"https?://(?!www\.w3\.org/2000/svg)|@import", page)
 
 
-def test_a_report_is_replaced_as_a_whole(tmp_path: Path) -> None:
+def test_a_report_is_replaced_as_a_whole(tmp_path):
     empty = Report(write_run(tmp_path / "run", [], manifest()))
     assert empty.index["rows"]["item"] == []
     assert set(map(tuple, empty.index["starts"].values())) == {()}
@@ -137,9 +133,7 @@ def test_a_report_is_replaced_as_a_whole(tmp_path: Path) -> None:
     assert (index["rows"]["entry"], index["rows"]["score"]) == ([1], [0.0])
 
 
-def test_scenes_are_drawn_from_where_they_are_and_from_no_other_data(
-    workspace: Workspace, tmp_path: Path
-) -> None:
+def test_scenes_are_drawn_from_where_they_are_and_from_no_other_data(workspace, tmp_path):
     workspace.write_suite(models=["oracle"])
     assert workspace.run().code == 0
     out, data = workspace.out, workspace.root / "data"
@@ -162,7 +156,7 @@ def test_scenes_are_drawn_from_where_they_are_and_from_no_other_data(
     assert "or it was changed since" in Report(out, made=made).index["lacking"]
 
 
-def test_boards_say_what_tables_say(made: Workspace) -> None:
+def test_boards_say_what_tables_say(made):
     one = (SiteRun("run", load_run(made.out), Sources()),)
     board = board_of(one, entries_of(one))
     tracks = {track["name"]: track for track in board["tracks"]}
@@ -192,9 +186,7 @@ def data_of(runs: Workspace) -> list[Path]:
     return [runs.root / "data", runs.root / "questions"]
 
 
-def test_runs_and_bundles_become_one_folder_the_same_every_time(
-    runs: Workspace, tmp_path: Path
-) -> None:
+def test_runs_and_bundles_become_one_folder_the_same_every_time(runs, tmp_path):
     paths = [runs.root / "first", runs.root / "later.zip"]
     found = write_site(paths, tmp_path / "a", data_of(runs))
     assert (found.models, found.samples, found.lacking) == (4, 58, "")
@@ -229,7 +221,7 @@ def planned(
     return SiteRun("run", run_of(records, facts), Sources())
 
 
-def test_only_whole_models_have_ranks() -> None:
+def test_only_whole_models_have_ranks():
     def board(*runs: SiteRun) -> dict[str, dict[str, Any]]:
         rows = board_of(runs, entries_of(runs))["rows"]
         return {row["name"]: row for row in rows}
@@ -265,7 +257,7 @@ def in_track(track: str, **more: Any) -> dict[str, Any]:
     }
 
 
-def test_a_model_asked_different_things_is_one_row_and_the_same_things_two() -> None:
+def test_a_model_asked_different_things_is_one_row_and_the_same_things_two():
     plan, vqa = (site_run(track, **in_track(track)) for track in ("full_planning", "vqa"))
     one = entries_of([plan, vqa])
     assert [entry.name for entry in one] == ["alpha", "beta"]
@@ -302,9 +294,7 @@ MEMBERSHIP = {**manifest(level1="membership")["suite"], "tracks": ["full_plannin
         ({"tracks": CARRIED}, "tracks.full_planning.carrying"),
     ],
 )
-def test_runs_that_differ_in_what_decides_are_refused_with_what_differs(
-    change: dict[str, Any], field: str
-) -> None:
+def test_runs_that_differ_in_what_decides_are_refused_with_what_differs(change, field):
     first = site_run("one", **in_track("full_planning", **shown({}, "a")))
     first.run.manifest.tracks["full_planning"]["carrying"] = 1
     other = site_run("two", **in_track("full_planning", **change))
@@ -315,7 +305,7 @@ def test_runs_that_differ_in_what_decides_are_refused_with_what_differs(
     assert ("--limit" in problem.hint) == (field == "dataset.sha256")
 
 
-def test_a_recording_and_a_larger_picture_stand_beside_any_other() -> None:
+def test_a_recording_and_a_larger_picture_stand_beside_any_other():
     first = site_run("one", **in_track("full_planning"))
     larger = site_run("two", **in_track("full_planning", **shown({"size_px": 512}, "b")))
     check_runs([site_run("one", **in_track("full_planning", **shown({}, "a"))), larger])
@@ -324,8 +314,8 @@ def test_a_recording_and_a_larger_picture_stand_beside_any_other() -> None:
 
 
 def test_a_build_that_was_stopped_never_looks_whole_and_what_is_not_ours_stays(
-    runs: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    runs, tmp_path, monkeypatch
+):
     out = tmp_path / "site"
     write_site([runs.root / "later"], out, title="One")
     (out / "CNAME").write_text("example.org")
@@ -350,7 +340,7 @@ def test_a_build_that_was_stopped_never_looks_whole_and_what_is_not_ours_stays(
     assert "<title>Two" in (out / "index.html").read_text(encoding="utf-8")
 
 
-def test_a_run_given_twice_and_a_broken_bundle_are_refused(runs: Workspace, tmp_path: Path) -> None:
+def test_a_run_given_twice_and_a_broken_bundle_are_refused(runs, tmp_path):
     paths = [runs.root / "later", runs.root / "later.zip"]
     with pytest.raises(SpecError, match="is the same run as"):
         write_site(paths, tmp_path / "s", data_of(runs))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import shutil
 from collections.abc import Callable
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -19,7 +18,7 @@ from tests.web.factory import manifest, write_run
 from tests.workspace import Workspace
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Page
+    from playwright.sync_api import Page
 
 Visiting = Callable[..., PageVisit]
 PHONE = {"width": 390, "height": 844}
@@ -100,7 +99,7 @@ CONTRAST = """() => {
 """Texts that stand out too little from what is behind them, with their ratio (WCAG AA: 4.5)."""
 
 
-def test_results_say_what_was_found_and_lead_to_models_and_samples(visit: PageVisit) -> None:
+def test_results_say_what_was_found_and_lead_to_models_and_samples(visit):
     page = visit.open()
     assert page.inner_text("h1") == "trial"
     titles = page.locator("h2").all_inner_texts()
@@ -130,7 +129,7 @@ def test_results_say_what_was_found_and_lead_to_models_and_samples(visit: PageVi
     visit.count("12 samples")
 
 
-def test_filters_and_search_narrow_the_list_and_stand_in_the_address(visit: PageVisit) -> None:
+def test_filters_and_search_narrow_the_list_and_stand_in_the_address(visit):
     page = visit.open("samples")
     visit.count("20 samples")
     for name, label, said in (
@@ -165,7 +164,7 @@ def test_filters_and_search_narrow_the_list_and_stand_in_the_address(visit: Page
     assert visit.words == address
 
 
-def test_keys_go_through_the_list_and_back_through_what_was_seen(visit: PageVisit) -> None:
+def test_keys_go_through_the_list_and_back_through_what_was_seen(visit):
     page = visit.open()
     page.get_by_role("link", name="Samples").click()
     title = page.locator(".bar-top h1")
@@ -189,7 +188,7 @@ def test_keys_go_through_the_list_and_back_through_what_was_seen(visit: PageVisi
     assert "There is no sample" in page.inner_text(".detail")
 
 
-def test_a_sample_is_drawn_played_and_turned(visiting: Visiting, made: Workspace) -> None:
+def test_a_sample_is_drawn_played_and_turned(visiting, made):
     visit = visiting(made.out / "report.html", draws=True)
     page = visit.page
     page.clock.install()
@@ -239,8 +238,8 @@ def test_a_sample_is_drawn_played_and_turned(visiting: Visiting, made: Workspace
 
 
 def test_a_stage_opens_at_the_first_wrong_step_and_moves_but_for_those_who_want_it_still(
-    visiting: Visiting, made: Workspace
-) -> None:
+    visiting, made
+):
     visit = visiting(made.out / "report.html", draws=True)
     page = visit.page
     page.clock.install()
@@ -276,7 +275,7 @@ def test_a_stage_opens_at_the_first_wrong_step_and_moves_but_for_those_who_want_
     assert len({*told} - {name.replace("_", " ") for name in ERROR_TYPES}) == len(ERROR_TYPES)
 
 
-def test_without_webgl_blocks_are_painted_and_turned(visit: PageVisit) -> None:
+def test_without_webgl_blocks_are_painted_and_turned(visit):
     page = visit.show("full_planning/oracle/t5/s0")
     stage = "canvas.stage"
     expect(page.locator(stage)).to_have_attribute("data-drawn", "painted")
@@ -287,7 +286,7 @@ def test_without_webgl_blocks_are_painted_and_turned(visit: PageVisit) -> None:
     assert page.eval_on_selector(stage, "canvas => canvas.toDataURL()") != before
 
 
-def test_questions_and_episodes_are_shown(visiting: Visiting, made: Workspace) -> None:
+def test_questions_and_episodes_are_shown(visiting, made):
     visit = visiting(made.out / "report.html", draws=True)
     page = visit.open("samples", track="vqa")
     visit.count("24 samples")
@@ -311,12 +310,8 @@ def test_questions_and_episodes_are_shown(visiting: Visiting, made: Workspace) -
 
 
 def test_what_a_model_saw_is_shown_pixel_for_pixel_or_said_not_to_be_kept(
-    trouble: PageVisit,
-    troubled: Workspace,
-    visiting: Visiting,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+    trouble, troubled, visiting, tmp_path, monkeypatch
+):
     sent = {record["track"]: record for record in troubled.records() if record["model"] == "alpha"}
     page = trouble.show(sent["full_planning"]["sample"])
     page.get_by_text("What the model saw").click()
@@ -339,9 +334,7 @@ def test_what_a_model_saw_is_shown_pixel_for_pixel_or_said_not_to_be_kept(
     expect(other.page.locator(".sent .notice")).to_contain_text("is not kept beside this page")
 
 
-def test_a_run_in_trouble_says_so_first(
-    trouble: PageVisit, visiting: Visiting, tmp_path: Path
-) -> None:
+def test_a_run_in_trouble_says_so_first(trouble, visiting, tmp_path):
     page = trouble.open()
     caution = page.text_content(".caution") or ""
     assert "This run is not finished:" in caution
@@ -357,9 +350,7 @@ def test_a_run_in_trouble_says_so_first(
     expect(said).to_contain_text("There is no sample here. This run is not finished: 0 of ")
 
 
-def test_a_report_without_data_or_scripts_shows_what_it_has(
-    visiting: Visiting, browser: Browser, made: Workspace, tmp_path: Path
-) -> None:
+def test_a_report_without_data_or_scripts_shows_what_it_has(visiting, browser, made, tmp_path):
     folder = tmp_path / "run"
     shutil.copytree(made.out, folder)
     facts = yaml.safe_load((folder / "run.yaml").read_text())
@@ -377,7 +368,7 @@ def test_a_report_without_data_or_scripts_shows_what_it_has(
     bare.close()
 
 
-def test_hostile_replies_do_nothing(visit: PageVisit) -> None:
+def test_hostile_replies_do_nothing(visit):
     page = visit.show("full_planning/random/t3/s0")
     page.locator("summary", has_text="Reasoning").click()
     # Half a pair of surrogates, which no output could hold, is read as U+FFFD.
@@ -423,8 +414,8 @@ OF_SITE = {
 
 @pytest.mark.parametrize("name", [*VIEWS, *OF_SITE])
 def test_every_view_can_be_read_and_reached_and_hostile_names_do_nothing(
-    visiting: Visiting, made: Workspace, site: Path, name: str
-) -> None:
+    visiting, made, site, name
+):
     view, words = (VIEWS | OF_SITE)[name]
     is_of_site = name in OF_SITE or name in ("results", "scenes")
     path = site if is_of_site else made.out / "report.html"
@@ -432,7 +423,7 @@ def test_every_view_can_be_read_and_reached_and_hostile_names_do_nothing(
     page = one.open(view, **words)
     assert page.evaluate(STRUCTURE) == SOUND
     for scheme in ("light", "dark"):
-        page.emulate_media(color_scheme=scheme)  # type: ignore[arg-type]
+        page.emulate_media(color_scheme=scheme)
         assert page.evaluate(CONTRAST) == []
     for width in (1024, 390):
         page.set_viewport_size({"width": width, "height": 844})
@@ -446,11 +437,8 @@ def test_every_view_can_be_read_and_reached_and_hostile_names_do_nothing(
 
 
 def test_a_leaderboard_says_what_was_found_and_shows_how_models_fail(
-    official_checkout: Path,
-    visiting: Visiting,
-    tmp_path_factory: pytest.TempPathFactory,
-    pictures_dir: Path,
-) -> None:
+    official_checkout, visiting, tmp_path_factory, pictures_dir
+):
     made = Workspace(tmp_path_factory.mktemp("paper"), pictures_dir)
     path = f"dataset.path={official_checkout}"
     made.phyblock(
@@ -489,7 +477,7 @@ def test_a_leaderboard_says_what_was_found_and_shows_how_models_fail(
     expect(page.locator(".wall li")).not_to_have_count(0)
 
 
-def test_what_is_not_there_is_said(site_visit: PageVisit) -> None:
+def test_what_is_not_there_is_said(site_visit):
     for view in ("model", "scene", "nothing"):
         page = site_visit.open(view, m="<b>x", s="<b>y")
         expect(page.locator("h1")).to_contain_text("There is no such")

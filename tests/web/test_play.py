@@ -56,7 +56,7 @@ async def asked(clock: Clock) -> tuple[PlaySession, asyncio.Task[tuple[str, floa
     return session, task
 
 
-def test_nothing_is_shown_before_the_beginning_and_no_name_or_answer_ever() -> None:
+def test_nothing_is_shown_before_the_beginning_and_no_name_or_answer_ever():
     async def play() -> None:
         session, task = await asked(Clock())
         told = session.state(-1)
@@ -77,7 +77,7 @@ def test_nothing_is_shown_before_the_beginning_and_no_name_or_answer_ever() -> N
     asyncio.run(play())
 
 
-def test_the_clock_runs_from_the_first_look_and_stands_still_in_pauses() -> None:
+def test_the_clock_runs_from_the_first_look_and_stands_still_in_pauses():
     async def play() -> tuple[str, float]:
         clock = Clock()
         session, task = await asked(clock)
@@ -98,7 +98,7 @@ def test_the_clock_runs_from_the_first_look_and_stands_still_in_pauses() -> None
     assert asyncio.run(play()) == ("1 0 1", 5.5)
 
 
-def test_an_answer_counts_once_and_only_for_what_lies_there() -> None:
+def test_an_answer_counts_once_and_only_for_what_lies_there():
     async def play() -> None:
         session, task = await asked(Clock())
         session.begin()
@@ -144,9 +144,7 @@ def played(suite: Path, picks: Sequence[int]) -> tuple[RunResult, list[str]]:
     return asyncio.run(sat()), shown
 
 
-def test_an_episode_goes_on_where_the_sitting_was_closed(
-    tmp_path: Path, pictures_dir: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_episode_goes_on_where_the_sitting_was_closed(tmp_path, pictures_dir, monkeypatch):
     workspace = Workspace(tmp_path, pictures_dir)
     workspace.write_scenes(SCENES[0])
     monkeypatch.setenv("PHYBLOCK_CACHE", str(workspace.cache))
@@ -165,8 +163,8 @@ def test_an_episode_goes_on_where_the_sitting_was_closed(
 
 
 def test_a_warm_up_on_another_scene_of_level_1_is_shown_how_it_went_and_not_kept(
-    tmp_path: Path, pictures_dir: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+    tmp_path, pictures_dir, monkeypatch
+):
     workspace = Workspace(tmp_path, pictures_dir)
     monkeypatch.setenv("PHYBLOCK_CACHE", str(workspace.cache))
     workspace.write_scenes(*SCENES[:2])
@@ -231,7 +229,7 @@ def ask(
     return found
 
 
-def test_it_listens_on_the_loopback_address_alone(server: Server, session: PlaySession) -> None:
+def test_it_listens_on_the_loopback_address_alone(server, session):
     assert server.address.startswith(f"http://127.0.0.1:{server.server_port}/")
     # The whole of 127/8 is this machine: another address of it is not answered.
     with pytest.raises(ConnectionRefusedError):
@@ -240,7 +238,7 @@ def test_it_listens_on_the_loopback_address_alone(server: Server, session: PlayS
         Server(session, server.server_port)
 
 
-def test_a_page_of_its_own_is_answered_and_may_load_nothing_from_elsewhere(server: Server) -> None:
+def test_a_page_of_its_own_is_answered_and_may_load_nothing_from_elsewhere(server):
     for host in server.hosts:
         assert ask(server, Host=host).status == 200
     answer = ask(server, path="/{token}/")
@@ -276,9 +274,7 @@ NOT_OURS = (
         (400, "GET", {"path": "http://[x]/{token}/state"}),
     ],
 )
-def test_others_are_refused_and_told_nothing(
-    server: Server, status: int, method: str, headers: dict[str, str | None]
-) -> None:
+def test_others_are_refused_and_told_nothing(server, status, method, headers):
     path = headers.get("path") or "/{token}/state"
     about = {name: value for name, value in headers.items() if name != "path"}
     answer = ask(server, method, path, b"{}" if method == "POST" else None, **about)
@@ -310,13 +306,7 @@ def test_others_are_refused_and_told_nothing(
         (409, b'{"change": 1, "picks": [0]}', {}),
     ],
 )
-def test_what_is_no_answer_is_refused_and_changes_nothing(
-    server: Server,
-    session: PlaySession,
-    status: int,
-    body: bytes | None,
-    headers: dict[str, str | None],
-) -> None:
+def test_what_is_no_answer_is_refused_and_changes_nothing(server, session, status, body, headers):
     before = session.state(-1)
     answer = ask(server, "POST", "/{token}/answer", body, **headers)
     assert answer.status == status
@@ -337,9 +327,7 @@ def until_idle() -> None:
         time.sleep(0.005)
 
 
-def test_only_files_that_were_named_are_served_and_a_fault_of_ours_is_seen(
-    server: Server, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_only_files_that_were_named_are_served_and_a_fault_of_ours_is_seen(server, tmp_path, capfd):
     names = ("report.html", "run.yaml", "gone.html")
     for name in names[:2]:
         (tmp_path / name).write_text("secret", encoding="utf-8")
@@ -367,9 +355,7 @@ TARGETS = st.one_of(
 
 
 @given(target=TARGETS, method=st.sampled_from(["GET", "POST"]))
-def test_whatever_is_asked_for_is_answered_with_a_refusal(
-    server: Server, target: str, method: str
-) -> None:
+def test_whatever_is_asked_for_is_answered_with_a_refusal(server, target, method):
     asked = target.replace("{token}", token(server))
     lines = f"{method} {asked} HTTP/1.1\r\nHost: {server.hosts[0]}\r\nConnection: close\r\n\r\n"
     with send(server, lines.encode("latin-1")) as connection, connection.makefile("rb") as answer:
@@ -380,9 +366,7 @@ def test_whatever_is_asked_for_is_answered_with_a_refusal(
 
 
 @pytest.mark.parametrize("resets", [True, False])
-def test_who_leaves_while_waiting_leaves_no_word_on_the_terminal(
-    server: Server, session: PlaySession, resets: bool, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_who_leaves_while_waiting_leaves_no_word_on_the_terminal(server, session, resets, capfd):
     # Threads of earlier requests may still be about to end, and would be taken for this one's.
     until_idle()
     path = f"/{token(server)}/state?after={session.state(-1)['change']}"
@@ -399,9 +383,7 @@ def test_who_leaves_while_waiting_leaves_no_word_on_the_terminal(
     assert capfd.readouterr() == ("", "")
 
 
-def test_the_address_for_a_browser_leads_on_once_and_does_not_tell_the_token(
-    server: Server,
-) -> None:
+def test_the_address_for_a_browser_leads_on_once_and_does_not_tell_the_token(server):
     origin, code = server.one_time_address.rstrip("/").rsplit("/", 1)
     assert origin == f"http://{server.hosts[0]}"
     assert code != token(server)

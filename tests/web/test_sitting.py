@@ -131,9 +131,7 @@ def poses(*steps: str) -> str:
     return "\n".join(f"Step{n}: block {one}" for n, one in enumerate(steps, 1))
 
 
-def test_a_sitting_by_mouse_keys_and_phone_over_a_kill(
-    browser: Browser, workspace: Workspace
-) -> None:
+def test_a_sitting_by_mouse_keys_and_phone_over_a_kill(browser, workspace):
     run = workspace.root / "ada"
     with sitting(browser, workspace) as sat:
         begin_with_mouse_and_keys(sat.page, run)
@@ -321,9 +319,7 @@ def stored_prompt(run: Path, record: Raw) -> list[object]:
         (["--name", "x", "--set", "vary.repeats=2"], "varies its presentation"),
     ],
 )
-def test_what_cannot_be_played_is_said_before_anything_is_begun(
-    workspace: Workspace, words: list[str], error: str
-) -> None:
+def test_what_cannot_be_played_is_said_before_anything_is_begun(workspace, words, error):
     before = sorted(workspace.root.rglob("*"))
     done = workspace.phyblock("play", "suite.yaml", "--no-browser", *words)
     assert done.code == 2, done.out
