@@ -8,7 +8,9 @@ import gc
 import signal
 from collections.abc import Callable, Sequence
 from functools import partial
+from importlib import import_module
 from pathlib import Path
+from threading import Thread
 from typing import Any
 
 import click
@@ -60,6 +62,8 @@ from phyblock.tracks.base import kind_of
 from phyblock.workers import open_workers
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
+_OBJECTS = 50_000
+"""So many new objects are made before garbage is collected; a sample makes few in cycles."""
 
 
 @click.command(epilog=f"Bundled suites: {', '.join(bundled_suites())}.")
@@ -138,6 +142,9 @@ def run(
     # Suite, scenes and modules stay to the end: collecting garbage among them repeatedly takes a
     # tenth of a run. So do records, while tables are made from them.
     gc.freeze()
+    gc.set_threshold(_OBJECTS)
+    if not is_as_it_was:
+        Thread(target=_import_for_tables).start()
     with ProgressView(console) as view:
         session = Session(plan, folder, view, **asks)
         result = completed(session, _SIGNALS, view.tick)
@@ -146,6 +153,12 @@ def run(
     code = _conclude(console, folder, result, view)
     print_path(console, made)
     return code
+
+
+def _import_for_tables() -> None:
+    """Import what tables need, which takes a third of a second, while models are asked."""
+    for module in ("phyblock.results.tables", "scipy.special"):
+        import_module(module)
 
 
 def _conclude(console: Console, folder: Path, result: RunResult, view: ProgressView) -> int:
@@ -258,7 +271,6 @@ def play(
     continue where it stopped.
     """
     import webbrowser
-    from threading import Thread
 
     from phyblock.results.load import load_run
     from phyblock.web.ending import Ending
