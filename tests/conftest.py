@@ -13,7 +13,7 @@ import pytest
 from hypothesis import settings
 
 from tests.fork_server import ONE_THREAD, end_fork_server
-from tests.workspace import Workspace
+from tests.workspace import KEY, KEY_VARIABLE, Workspace
 
 OFFICIAL_MISSING = (
     "official PhyBlock data not found: put it at ../shared or set PHYBLOCK_OFFICIAL to the folder "
@@ -25,7 +25,7 @@ EXAMPLES = int(os.environ.get("PHYBLOCK_EXAMPLES", "100"))
 settings.register_profile("phyblock", deadline=None, max_examples=EXAMPLES)
 settings.load_profile("phyblock")
 
-os.environ.update(ONE_THREAD)
+os.environ.update(ONE_THREAD | {KEY_VARIABLE: KEY})
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     # A shell has the commands that it starts in the background ignore it, and their children too.

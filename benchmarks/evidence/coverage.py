@@ -3,7 +3,7 @@
     python -m benchmarks.evidence.coverage [--worlds 1000] [--resamples 1000] [--seed 0]
 
 Run from the root of a checkout. Worlds of scenes are made up in which the true F1 is known
-(tests/scoring/worlds.py): 150 base scenes and 250 scenes made of two of them, as in the official
+(tests/scoring/cases.py): 150 base scenes and 250 scenes made of two of them, as in the official
 data. `jackknife` is what phyblock does (phyblock/scoring/statistics.py); `pigeonhole` is the
 bootstrap that it did before (Owen, Annals of Applied Statistics 1, 2007), `naive` takes scenes as
 independent.
@@ -19,7 +19,7 @@ from scipy.special import ndtr, ndtri, stdtr, stdtrit  # type: ignore[import-unt
 
 from phyblock.scoring.plan import Floats, Metric, f1_of
 from phyblock.scoring.statistics import Clusters, in_range, jackknife
-from tests.scoring.worlds import World
+from tests.scoring.cases import World
 
 WORLDS = {
     "like the recorded models": World(),

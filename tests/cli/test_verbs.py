@@ -20,12 +20,11 @@ from phyblock.models import litellm_client
 from phyblock.models.litellm_client import known_providers
 from phyblock.records.files import read_records
 from phyblock.sim.engine import ENGINES
-from phyblock.tracks.step_planning import EpisodeRecord, StepPlanning
+from phyblock.tracks.step_planning import StepPlanning
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
-from tests.vqa_set import questions, vqa_suite, write_questions
 from tests.web.factory import LEVELS, manifest, record, score, write_run
-from tests.workspace import Workspace
+from tests.workspace import Workspace, questions, vqa_suite, write_questions
 
 VERBS = tuple(phyblock.list_commands(None))
 CALLS = re.compile(rf"\bphyblock ((?:{'|'.join(VERBS)})\b[^\n`;|&>\"#]*)")
@@ -86,7 +85,6 @@ def is_option(verb: str, *words: str) -> bool:
     """True if a verb, or its own verb that the next word names, has the option that ends it."""
     context = click.Context(phyblock)
     command = phyblock.get_command(context, verb)
-    assert command is not None
     inner = command.get_command(context, words[0]) if isinstance(command, click.Group) else None
     known = {name for one in (command, inner) if one for param in one.params for name in param.opts}
     return words[-1] in known | {"--help"}
@@ -191,7 +189,6 @@ def test_an_episode_is_shown_step_by_step(played):
 def test_a_film_tells_the_outcome_of_each_step_and_the_end(played):
     (task,) = read_builtin(played.root / "data").tasks
     for episode in read_records(played.root / "out"):
-        assert isinstance(episode, EpisodeRecord)
         _, *frames, last = REPORT.film(episode, task)
         for frame, outcome in zip(frames, episode.outcomes, strict=True):
             heading = REPORT.heading("step", outcome)

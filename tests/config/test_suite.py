@@ -20,10 +20,8 @@ from phyblock.config.yaml import dump_yaml
 from phyblock.errors import SpecError
 from phyblock.files import bundled
 from phyblock.types import BACKGROUNDS
-from tests.config.strategies import FIELDS, REQUIRED, SECTIONS, SUITES
 from tests.config.tables import table, told
-from tests.fuzz.strategies import OVERRIDES as OVERRIDE_TEXTS
-from tests.fuzz.strategies import SUITES as ANY_SUITES
+from tests.fuzz.strategies import FIELDS, OVERRIDES, REQUIRED, SECTIONS, SOUND_SUITES, SUITES
 
 SUITE_MODEL = suite_model()
 HEAD = "name: s\nmodels: [oracle]\n"
@@ -60,7 +58,7 @@ def load(folder: Path, text: str, *overrides: str) -> Suite:
     return load_suite(path, overrides)
 
 
-@given(raw=SUITES)
+@given(raw=SOUND_SUITES)
 def test_a_dumped_suite_loads_equal(folder, raw):
     suite = SUITE_MODEL.model_validate(raw)
     dumped = suite.model_dump(mode="json")
@@ -68,7 +66,7 @@ def test_a_dumped_suite_loads_equal(folder, raw):
         assert load(folder, text).model_dump() == suite.model_dump()
 
 
-@given(raw=SUITES, data=st.data())
+@given(raw=SOUND_SUITES, data=st.data())
 def test_identity_is_json_without_bounds_places_and_order(raw, data):
     identity = SUITE_MODEL.model_validate(raw).identity()
     json.dumps(identity, allow_nan=False)
@@ -106,7 +104,7 @@ def outcome(folder: Path, raw: dict[str, Any], *overrides: str) -> object:
         return {(problem.field, problem.message) for problem in error.problems}
 
 
-@given(raw=SUITES, changes=CHANGES)
+@given(raw=SOUND_SUITES, changes=CHANGES)
 def test_overrides_equal_editing_the_file(folder, raw, changes):
     edited = copy.deepcopy(raw)
     for key, value in changes.items():
@@ -188,7 +186,7 @@ def test_a_variant_is_the_suite_with_other_values_in_its_fields(folder):
 
 
 @settings(deadline=None, max_examples=40)
-@given(data=ANY_SUITES, override=st.none() | OVERRIDE_TEXTS)
+@given(data=SUITES, override=st.none() | OVERRIDES)
 def test_any_suite_is_read_or_refused(folder, data, override):
     (folder / "law.yaml").write_bytes(data)
     with contextlib.suppress(SpecError):

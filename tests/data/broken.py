@@ -1,4 +1,6 @@
-"""A sound scene in the project's own format, and ways to write it down and break it."""
+"""A sound scene in the project's own format, and ways to write it down and break it; a sound record
+line, and ways in which a hand or a disk damages it.
+"""
 
 from __future__ import annotations
 
@@ -83,3 +85,77 @@ def write_checkout(root: Path, *scenes: Raw) -> Path:
         path = candidates / f"{scene['id']}_16_cand_blocks.json"
         path.write_text(json.dumps(numbered), encoding="utf-8")
     return root
+
+
+BEFORE = Path(__file__).parents[1] / "records" / "format-1.jsonl"
+"""A record of each track as the first version wrote it."""
+
+
+def lines_before() -> list[bytes]:
+    return BEFORE.read_bytes().splitlines()
+
+
+def plan_record() -> Raw:
+    """The record of a plan."""
+    found: Raw = json.loads(lines_before()[0])
+    return found
+
+
+def record_with(at: str, value: object) -> bytes:
+    """The record with another value at a dotted place, as a line."""
+    return json.dumps(with_value(plan_record(), at, value)).encode()
+
+
+def with_text(value: str, text: str) -> bytes:
+    """The record's line with JSON text in the place of a value that stands in it once."""
+    line = json.dumps(plan_record(), separators=(",", ":"))
+    assert line.count(value) == 1, value
+    return line.replace(value, text).encode()
+
+
+DAMAGED: dict[str, tuple[bytes, str, str]] = {
+    "nan": (with_text('"latency_s":0.0', '"latency_s":NaN'), "", "NaN"),
+    "infinity": (with_text('"latency_s":0.0', '"latency_s":-Infinity'), "", "Infinity"),
+    "too-large": (with_text('"latency_s":0.0', '"latency_s":1e999'), "", "1e999"),
+    "nan-undeclared": (with_text('"seed_sent":true', '"mine":{"x":NaN}'), "", "NaN"),
+    "huge-number": (record_with("reply.usage.completion_tokens", 10**30),
+        "reply.usage.completion_tokens", "out of range"),
+    "many-digits": (with_text('"latency_s":0.0', '"latency_s":' + "9" * 9999), "", "9,999 digits"),
+    "deep": (with_text('"latency_s":0.0', '"latency_s":' + "[" * 9999 + "]" * 9999), "", "deep"),
+    "text-for-number": (record_with("seed", "0"), "seed", "wrong type"),
+    "number-for-text": (record_with("reply.text", 5), "reply.text", "wrong type"),
+    "no-cost": (record_with("reply.billed_usd", -5), "reply.billed_usd", "out of range"),
+    "word": (record_with("outcome", "fine"), "outcome", "allowed: ok, "),
+    "finish": (record_with("reply.finish", "never"), "reply.finish", "allowed: stop, "),
+    "truth": (record_with("n_blocks", True), "n_blocks", "wrong type"),
+    "score": (record_with("scores.1.tp", 1.5), "scores[1].tp", "wrong type"),
+    "parse": (record_with("parse.plan", "1, 2"), "parse.plan", "wrong type"),
+    "track": (record_with("track", "singing"), "track", "full_planning"),
+    "empty": (b"", "", "not a record"),
+    "blank": (b"  \r", "", "not a record"),
+    "no-object": (b"[1, 2]", "", "not a record"),
+    "not-utf8": (b'{"sample": "\xff"}', "", "UTF-8"),
+    "cut": (json.dumps(plan_record()).encode()[:300], "", "not a record"),
+    "zeros": (b"\0" * 64, "", "not a record"),
+}  # fmt: skip
+"""By name: a line, the field that is named, and what else is said."""
+
+YAML_TEXTS: dict[str, str] = {
+    "anchors": "[&a [x, x, x, x, x, x, x, x], &b [*a, *a, *a, *a, *a, *a, *a, *a], "
+    "&c [*b, *b, *b, *b, *b, *b, *b, *b], &d [*c, *c, *c, *c, *c, *c, *c, *c], "
+    "&e [*d, *d, *d, *d, *d, *d, *d, *d], &f [*e, *e, *e, *e, *e, *e, *e, *e], "
+    "&g [*f, *f, *f, *f, *f, *f, *f, *f], [*g, *g, *g, *g, *g, *g, *g, *g]]",
+    "anchor-of-itself": "&a [*a]",
+    "deep": "[" * 2000 + "]" * 2000,
+    "binary": "!!binary aGVsbG8=",
+    "set": "!!set {a, b}",
+    "pairs": "!!pairs [a: 1]",
+    "python": "!!python/object/apply:os.getcwd []",
+    "hex": "0x" + "f" * 6000,
+    "digits": "9" * 6000,
+    "no-number": "!!int x",
+    "no-truth": "!!bool x",
+    "half-a-character": '"\\ud800"',
+    "list-as-key": "{[1]: 2}",
+}
+"""YAML that `phyblock run` never writes, by what is bad about it."""

@@ -9,8 +9,7 @@ import pytest
 
 from tests.fuzz.laws import Bench
 from tests.fuzz.strategies import FAULTS, INPUTS, SEED
-from tests.vqa_set import questions, vqa_suite, write_questions
-from tests.workspace import SCENES, Workspace
+from tests.workspace import SCENES, Workspace, questions, vqa_suite, write_questions
 
 _tallies: dict[str, Counter[str]] = {}
 _SCENES = SCENES[:2]

@@ -27,8 +27,7 @@ from aiohttp import web
 from tests.fork_server import fork_server
 from tests.servers.chassis import Seen
 from tests.servers.faults import WIRE_FAULTS
-from tests.servers.openai_chat import OpenAIChat
-from tests.servers.step_agent import StepAgent
+from tests.servers.openai_chat import OpenAIChat, StepAgent
 from tests.workspace import Workspace, shared_folders
 
 CODES = (0, 1, 2, 130)

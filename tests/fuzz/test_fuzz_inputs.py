@@ -15,7 +15,7 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.data.broken import sound_scene
+from tests.data.broken import YAML_TEXTS, sound_scene
 from tests.fuzz.laws import Bench, Case, Fifo, Link
 from tests.fuzz.strategies import (
     CANDIDATES,
@@ -32,7 +32,6 @@ from tests.fuzz.strategies import (
     broken,
     fuzzed,
 )
-from tests.records.damage import YAML_TEXTS
 
 pytestmark = pytest.mark.fuzz
 

@@ -21,8 +21,7 @@ from tests.fuzz.laws import Ledger, LedgerAgent, LedgerChat, kept_in
 from tests.fuzz.strategies import KILLS, SEED
 from tests.run.test_track_runs import by_sample
 from tests.servers.chassis import FAULTS, Faults, Running
-from tests.vqa_set import questions, vqa_suite, write_questions
-from tests.workspace import SCENES, Workspace
+from tests.workspace import SCENES, Workspace, questions, vqa_suite, write_questions
 
 AT_ONCE = 6
 PRICE = {"input": 10.0, "output": 100.0}

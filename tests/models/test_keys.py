@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from phyblock.config.models import ModelConfig
 from phyblock.errors import UnavailableError
 from phyblock.models.keys import KeyStatus, api_key, api_key_status, hidden, secrets_of
-from tests.models.factory import KEY_VARIABLE
+from tests.workspace import KEY_VARIABLE
 
 
 @pytest.fixture(autouse=True)

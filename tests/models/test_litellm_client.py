@@ -28,9 +28,10 @@ from phyblock.models.model import RetryPolicy
 from phyblock.models.request import Message
 from phyblock.records.record import Reply
 from phyblock.run.plan import to_config
-from tests.models.factory import KEY_VARIABLE, ROUTES, ask, make_model, make_request, reply_of
+from tests.models.factory import ROUTES, ask, make_model, make_request, reply_of
 from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat
+from tests.workspace import KEY_VARIABLE
 
 ROOT = Path(__file__).parents[2]
 OWN_CLIENT = ["amazon_nova/m", "cohere_chat/m", "maritalk/m", "oobabooga/m", "petals/m"]
@@ -106,7 +107,6 @@ def hosts(monkeypatch: pytest.MonkeyPatch) -> set[str]:
 @pytest.fixture(autouse=True)
 def _environment(monkeypatch: pytest.MonkeyPatch) -> None:
     for name, value in {
-        KEY_VARIABLE: "sk-not-a-real-key-1234",
         "NO_PROXY": "*",
         "AWS_EC2_METADATA_DISABLED": "true",
         "AWS_REGION": "eu-west-1",

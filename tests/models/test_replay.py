@@ -21,8 +21,8 @@ from phyblock.models.model import build_model
 from phyblock.models.request import Model, Request
 from phyblock.records.record import Reply, Usage
 from phyblock.tracks.full_planning import PLAN_RULES, PlanSubject
+from tests.data.broken import plan_record
 from tests.models.factory import CANDIDATES, SCENE, make_request
-from tests.records.damage import plan_record
 
 STEPS = "Step1: Move block with index 3"
 
@@ -101,7 +101,6 @@ def test_a_run_of_our_own_is_matched_by_model_key_and_seed(tmp_path):
     )
     assert answer(model, "007", 1) == expected
     last = answer(model, "007", 2)
-    assert last is not None
     assert last.text == "last"
     assert answer(model, "007", 3) is None
     assert answer(model, "008", 1) is None
@@ -242,9 +241,7 @@ seeds = st.integers(0, 10**6)
 def said(name: str, request: Request) -> Reply:
     model = build_model(ModelConfig(name=name), cache=None)
     assert not model.needs_messages
-    answer = asyncio.run(model.ask(request))
-    assert answer is not None
-    return answer
+    return asyncio.run(model.ask(request))
 
 
 def steps(name: str, request: Request) -> list[int]:

@@ -15,7 +15,7 @@ from phyblock.records.files import MANIFEST, Manifest, Validation, known_records
 from phyblock.records.record import Call
 from phyblock.results.load import load_run
 from phyblock.run.rescore import rescore
-from tests.records.damage import YAML_TEXTS, Raw, plan_record
+from tests.data.broken import YAML_TEXTS, Raw, plan_record
 from tests.workspace import Workspace
 
 IDENTITY = "5eed" * 16
@@ -78,7 +78,6 @@ def test_a_call_of_another_run_is_foreign():
     assert Validation(manifest, {"t"}).problem("calls.jsonl:1", call) is None
     other = call.model_copy(update={"run": "0" * 16})
     problem = Validation(manifest, {"s"}).problem("calls.jsonl:1", other)
-    assert problem is not None
     assert problem.field == "run"
 
 

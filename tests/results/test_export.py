@@ -22,9 +22,8 @@ from phyblock.integrations import huggingface
 from phyblock.integrations.files import write_vlmevalkit
 from phyblock.results.export import export_frame, export_run
 from phyblock.results.load import load_run
-from tests.vqa_set import write_questions
 from tests.web.factory import LEVELS, manifest, record, score, write_run
-from tests.workspace import Workspace
+from tests.workspace import Workspace, write_questions
 
 HF = "the package datasets is not installed"
 

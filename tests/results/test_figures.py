@@ -47,12 +47,10 @@ def run() -> Run:
 def test_lines_over_levels_and_cost_show_the_headline(run):
     values = Headline(run, TRACK).values
     drawn = levels(run, track=TRACK)
-    assert drawn is not None
     for line in drawn.axes[0].lines:
         wanted = [values[str(line.get_label()), f"Level {n}"].value for n in (1, 2, 3, 4)]
         assert list(line.get_ydata()) == pytest.approx(wanted)
     drawn = cost(run, track=TRACK)
-    assert drawn is not None
     points = {round(line.get_xdata()[0], 6): line.get_ydata()[0] for line in drawn.axes[0].lines}
     assert points == pytest.approx(
         {n + 1.0: values[model, "Overall F1"].value for n, model in enumerate(MODELS)}
@@ -62,7 +60,6 @@ def test_lines_over_levels_and_cost_show_the_headline(run):
 def test_shares_fill_a_bar(run):
     for table in ("errors", "losses"):
         drawn = shares(run, track=TRACK, table=table)
-        assert drawn is not None
         widths: dict[float, float] = {}
         for bar in drawn.axes[0].patches:
             place = round(bar.get_y(), 3)
@@ -81,7 +78,6 @@ def test_a_run_without_an_answer_draws_nothing_and_does_not_fail(tmp_path):
 def test_a_forest_has_a_row_a_pair_or_of_two_models_a_row_a_part(run):
     for chosen, rows in ((run, 3), (of_models(run, MODELS[:2]), 5)):
         drawn = forest(chosen, track=TRACK)
-        assert drawn is not None
         assert len(drawn.axes[0].get_yticks()) == rows
     assert forest(of_models(run, MODELS[:1]), track=TRACK) is None
 

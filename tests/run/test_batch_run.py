@@ -14,8 +14,7 @@ import pytest
 
 from tests.servers.batches import BatchFaults, BatchServer, OpenAIBatches
 from tests.servers.chassis import Running
-from tests.vqa_set import questions, write_questions
-from tests.workspace import Workspace
+from tests.workspace import Workspace, questions, write_questions
 
 POLLING = {"batch_poll_s": 0.05}
 
@@ -48,7 +47,6 @@ def test_all_tracks_of_one_turn_go_out_in_batches_at_half_the_price(workspace):
         assert (done.code, done.err) == (0, "")
         assert "waiting for batch batch-0 since" in done.out
         server = running.server
-        assert isinstance(server, OpenAIBatches)
         records = workspace.records()
         assert len(records) == 4
         assert counted_once(server, 4)
@@ -63,7 +61,6 @@ def test_a_run_that_waits_is_stopped_and_goes_on_by_the_same_command(workspace):
     """Between both commands the provider is asked nothing, and the estimate asks for no money."""
     with Running(OpenAIBatches(batch=BatchFaults(looks=10**6))) as running:
         server = running.server
-        assert isinstance(server, OpenAIBatches)
         prepare(workspace, running.url)
         waits = threading.Event()
         looks = iter(range(10**6))
@@ -109,7 +106,6 @@ def test_kills_of_the_process_lose_nothing_and_ask_nothing_twice(workspace):
     """When a batch is made and nobody heard, then when its answers are on their way."""
     with Running(OpenAIBatches()) as running:
         server = running.server
-        assert isinstance(server, OpenAIBatches)
         prepare(workspace, running.url)
         for number, name in ((3, "create"), (5, "results")):
             assert killed_at(workspace, server, number)

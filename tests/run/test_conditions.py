@@ -196,7 +196,6 @@ def asked(server: OpenAIChat) -> list[str]:
 def test_every_way_is_asked_once_and_the_reference_is_what_a_plain_suite_asks(workspace):
     with Running(OpenAIChat(say=moody)) as running:
         server = running.server
-        assert isinstance(server, OpenAIChat)
         prepare(workspace, running.url, vary=VARY)
         dry = workspace.run("--dry-run")
         assert "16 conditions" in dry.out

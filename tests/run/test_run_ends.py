@@ -25,7 +25,7 @@ from phyblock.config.models import load_models
 from phyblock.config.suite import load_suite
 from phyblock.errors import SimulationError
 from phyblock.records.files import STOPPED
-from phyblock.records.record import Line, Record
+from phyblock.records.record import Line
 from phyblock.run.plan import make_plan
 from phyblock.run.rescore import rescore
 from phyblock.run.runner import RunEvent, SampleDone, Session, Stopping, to_its_end
@@ -34,8 +34,7 @@ from phyblock.sim import dynamics
 from phyblock.tracks.full_planning import FullPlanning
 from phyblock.tracks.pictures import Workshop
 from phyblock.tracks.pose_planning import PosePlanning
-from tests.fork_server import Forked
-from tests.run.killing import killed
+from tests.fork_server import Forked, killed
 from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import SCENES, Workspace, call
@@ -61,7 +60,6 @@ def interrupted(process: Forked, server: OpenAIChat, name: signal.Signals) -> tu
     """Interrupt a run while its calls are held, and let them be answered once it waits for them."""
     wait_for(lambda: server.at_once == AT_ONCE)
     process.send_signal(name)
-    assert process.stdout is not None
     assert f"waiting for {AT_ONCE} calls in progress" in process.stdout.readline()
     server.holds = False
     return ended(process)
@@ -105,7 +103,6 @@ def test_a_second_interrupt_ends_at_once(workspace):
         process = workspace.start()
         wait_for(lambda: running.server.at_once == AT_ONCE)
         process.send_signal(signal.SIGINT)
-        assert process.stdout is not None
         said = process.stdout.readline()
         assert "Ctrl-C again" in said
         process.send_signal(signal.SIGINT)
@@ -147,7 +144,6 @@ def test_a_program_is_interrupted_in_a_run_as_well_at_any_time(workspace):
             stderr=errors,
             text=True,
         )
-        assert process.stdout is not None
         with process, process.stdout as said:
             try:
                 # The reply cache is opened last; until it is unlocked, the run is not open.
@@ -244,7 +240,6 @@ def test_an_impatient_cancellation_keeps_all_that_was_answered(workspace, monkey
     answered: list[str] = []
 
     async def notes(self: AppendFile, record: Line) -> None:
-        assert isinstance(record, Record)
         answered.append(record.sample)
         await put(self, record)
 
@@ -267,7 +262,6 @@ def test_an_impatient_cancellation_keeps_all_that_was_answered(workspace, monkey
         may_end.set()
         with pytest.raises(asyncio.CancelledError):
             await running
-        assert opened.result.stop is not None
         assert opened.result.stop.cause == "interrupted"
 
     monkeypatch.setattr(AppendFile, "append", appends_slowly)
@@ -386,7 +380,6 @@ def test_a_wait_before_another_attempt_is_given_up(workspace):
 def test_a_wait_for_a_server_that_cannot_be_reached_is_given_up(workspace):
     prepare(workspace, "http://127.0.0.1:9", "alpha")
     process = workspace.start()
-    assert process.stdout is not None
     while "http://127.0.0.1:9 cannot be reached" not in process.stdout.readline():
         assert process.poll() is None
     process.send_signal(signal.SIGINT)

@@ -19,7 +19,7 @@ from phyblock.registry import known_tracks
 from phyblock.run import manifest, rescore, store
 from tests.run.test_track_runs import by_sample
 from tests.servers.chassis import Faults, Running, Seen
-from tests.servers.step_agent import StepAgent
+from tests.servers.openai_chat import StepAgent
 from tests.workspace import Raw, Workspace, call
 
 EARLIER = 5

@@ -11,13 +11,11 @@ from phyblock.config.suite import Suite
 from phyblock.models.cache import reply_key
 from phyblock.run.plan import to_config
 from tests.models.factory import ask, make_model, make_request
-from tests.servers.anthropic_messages import AnthropicMessages
 from tests.servers.chassis import Faults, LocalServer, Running, Seen
-from tests.servers.gemini_generate import GeminiGenerate
 from tests.servers.openai_chat import OpenAIChat
-from tests.workspace import Workspace
+from tests.servers.other_protocols import AnthropicMessages, GeminiGenerate
+from tests.workspace import KEY_VARIABLE, Workspace
 
-KEY = "sk-not-a-real-key-1234"
 WAYS: list[tuple[str, str, str, type[LocalServer]]] = [
     ("OPENAI_BASE_URL", "openai/m", "/v1", OpenAIChat),
     ("OPENAI_API_BASE", "openai/m", "/v1", OpenAIChat),
@@ -40,13 +38,12 @@ WAYS: list[tuple[str, str, str, type[LocalServer]]] = [
 
 
 def config_of(model_id: str, transport: str = "auto") -> ModelConfig:
-    spec = ModelConfig(id=model_id, api_key_env="PHYBLOCK_TEST_KEY", transport=transport)
+    spec = ModelConfig(id=model_id, api_key_env=KEY_VARIABLE, transport=transport)
     return to_config("m", spec, Suite(name="s", models=("m",)))
 
 
 @pytest.fixture(autouse=True)
 def _environment(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("PHYBLOCK_TEST_KEY", KEY)
     for variable, *_ in WAYS:
         monkeypatch.delenv(variable, raising=False)
 

@@ -25,10 +25,8 @@ from phyblock.sim.pictures import PictureStyle
 from phyblock.sim.question_pictures import question_png
 from tests.fork_server import Done
 from tests.servers.chassis import ISSUE_MIX, Faults, Running, Seen
-from tests.servers.openai_chat import OpenAIChat
-from tests.servers.step_agent import StepAgent, said, told_history
-from tests.vqa_set import questions, vqa_suite, write_questions
-from tests.workspace import Raw, Workspace, call, candidates
+from tests.servers.openai_chat import OpenAIChat, StepAgent, said, told_history
+from tests.workspace import Raw, Workspace, call, candidates, questions, vqa_suite, write_questions
 
 TRACKS = ["full_planning", "step_planning", "vqa"]
 FORMAT = {"answer_format": "json_schema"}
@@ -168,12 +166,8 @@ def pictures_of(workspace: Workspace) -> dict[str, tuple[Question, dict[str, str
 def shown(seen: Seen) -> list[tuple[str, str]]:
     """Caption and digest of each picture in the order in which they arrived."""
     parts = seen.parts[:-1]
-    pairs = [(parts[i], parts[i + 1]) for i in range(0, len(parts), 2)]
-    for caption, picture in pairs:
-        assert isinstance(caption, str)
-        assert isinstance(picture, tuple)
-        assert picture[0] == "image/png"
-    return [(str(caption), picture[1]) for caption, picture in pairs]
+    assert {kind for kind, _ in parts[1::2]} == {"image/png"}
+    return [(caption, digest) for caption, (_, digest) in zip(parts[::2], parts[1::2], strict=True)]
 
 
 def test_pictures_arrive_in_order_each_with_its_caption(workspace):
@@ -185,7 +179,6 @@ def test_pictures_arrive_in_order_each_with_its_caption(workspace):
     assert server.requests == 8
     for seen in server.seen:
         found = re.search(r"^Question: (.*)$", str(seen.parts[-1]), re.MULTILINE)
-        assert found is not None
         question, labels = by_text[found[1]]
         captions = {
             "scene": "First picture:" if len(labels) > 1 else "Picture:",

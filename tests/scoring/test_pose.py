@@ -60,7 +60,6 @@ def laid(scene: Scene, candidates: CandidateSet, order: list[int]) -> list[Laid]
     for vertex in order:
         block = scene.blocks[vertex]
         number = candidates.index_of(block.look)
-        assert number is not None
         found.append(Laid(number, block.position_m, block.euler_deg))
     return found
 

@@ -29,8 +29,7 @@ from phyblock.scoring.statistics import (
     spread_of_items,
     within,
 )
-from tests.scoring.cases import precision_of, recall_of
-from tests.scoring.worlds import World
+from tests.scoring.cases import World, precision_of, recall_of
 from tests.shipped import official_tasks
 
 NAMES = st.lists(st.sampled_from("abcdefg"), min_size=1, max_size=3)

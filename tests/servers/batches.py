@@ -17,11 +17,10 @@ from typing import Any
 
 from aiohttp import web
 
-from tests.servers.anthropic_messages import AnthropicMessages
 from tests.servers.chassis import LocalServer, Seen
 from tests.servers.faults import reset_connection
-from tests.servers.gemini_generate import GeminiGenerate
 from tests.servers.openai_chat import OpenAIChat
+from tests.servers.other_protocols import AnthropicMessages, GeminiGenerate
 
 NEVER_ASKED = ("expired", "cancelled")
 ODD = ("broken", "twice", "stranger")
@@ -209,7 +208,6 @@ class OpenAIBatches(BatchServer, OpenAIChat):
         form = await request.post()
         assert form["purpose"] == "batch"
         file = form["file"]
-        assert isinstance(file, web.FileField)
         self.files.append([json.loads(line) for line in file.file.read().splitlines()])
         return {"id": f"file-{len(self.files) - 1}", "object": "file", "purpose": "batch"}
 

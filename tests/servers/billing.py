@@ -23,14 +23,12 @@ import tiktoken
 from PIL import Image
 from tokenizers import Tokenizer
 
-from tests.servers.anthropic_messages import AnthropicMessages
 from tests.servers.chassis import LocalServer, Seen
-from tests.servers.gemini_generate import GeminiGenerate
 from tests.servers.openai_chat import OpenAIChat
+from tests.servers.other_protocols import AnthropicMessages, GeminiGenerate
 
 COMPLETION = 40
 _LITELLM = importlib.util.find_spec("litellm")
-assert _LITELLM is not None
 _CARRIED = Path(str(_LITELLM.origin)).parent / "litellm_core_utils" / "tokenizers"
 
 

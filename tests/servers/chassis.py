@@ -254,8 +254,6 @@ class Running:
         return self
 
     def __exit__(self, *_: object) -> None:
-        assert self._loop is not None
-        assert self._stop is not None
         self._loop.call_soon_threadsafe(self._stop.set)
         self._thread.join(10)
         assert not self._thread.is_alive(), "the server did not stop"
@@ -282,7 +280,6 @@ class Running:
         self._in_loop(self._come_back())
 
     def _in_loop(self, work: Coroutine[Any, Any, None]) -> None:
-        assert self._loop is not None
         asyncio.run_coroutine_threadsafe(work, self._loop).result(10)
 
     async def _die(self) -> None:
@@ -300,7 +297,6 @@ async def kill(*runners: web.AppRunner) -> None:
     for runner in runners:
         for site in list(runner.sites):
             await site.stop()
-        assert runner.server is not None
         for connection in runner.server.connections:
             if connection.transport is not None:
                 connection.transport.abort()

@@ -181,7 +181,6 @@ async def _reset_midway(
 
 async def _raw(_: LocalServer, __: Seen, request: web.Request, *, data: bytes) -> web.Response:
     """Answer with bytes that are no HTTP, or more of it than anyone reads."""
-    assert request.transport is not None
     request.transport.write(data)
     request.transport.close()
     return web.Response()

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import json
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -66,10 +68,41 @@ class OpenAIChat(LocalServer):
 
 def _part(part: dict[str, Any]) -> str | tuple[str, str]:
     if part["type"] == "text":
-        text: str = part["text"]
-        return text
+        return part["text"]
     head, _, data = part["image_url"]["url"].partition(";base64,")
     return head.removeprefix("data:"), hashlib.sha256(base64.b64decode(data)).hexdigest()
+
+
+_HISTORY = re.compile(r"^\d+\. (?P<operation>.+?)(?:: .*)?$", re.MULTILINE)
+
+
+class StepAgent(OpenAIChat):
+    """Answers `Next plan: Move(N)`, N by a digest of the messages; now and then not readably.
+
+    The digest of a request stands in the reply's reasoning, so that it is found again on disk.
+    """
+
+    def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
+        body = super().reply(seen, ending)
+        if ending == "ok":
+            message = body["choices"][0]["message"]
+            message["content"] = said(seen)
+            message["reasoning_content"] = seen.sample
+        return body
+
+
+def said(seen: Seen) -> str:
+    """Return the agent's answer."""
+    digest = hashlib.sha256(json.dumps([seen.system, seen.parts]).encode()).digest()
+    if digest[0] < 20:
+        return "I would rather not say."
+    return f"The base comes first.\nNext plan: Move({digest[1] % 5 + 1})"
+
+
+def told_history(seen: Seen) -> list[str]:
+    """The operations of the history as it stands in the text of a request."""
+    (text,) = [part for part in seen.parts if isinstance(part, str)]
+    return [match["operation"] for match in _HISTORY.finditer(text)]
 
 
 if __name__ == "__main__":

@@ -1,15 +1,59 @@
+"""Tracks opened for tests on a suite of some fields; scenes, and who draws their pictures."""
+
 from __future__ import annotations
 
-from collections.abc import Iterator
+import tempfile
+from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
+import yaml
 
+from phyblock.config.suite import Suite, load_suite
+from phyblock.data.base import Dataset
 from phyblock.data.scenes import read_builtin
-from phyblock.domain.scene import AssemblyTask
+from phyblock.domain.scene import AssemblyTask, Block, Candidate, CandidateSet, Scene
+from phyblock.tracks.base import open_tracks
 from phyblock.tracks.pictures import Workshop
 from tests.data.broken import write_scenes
+from tests.shipped import TASKS
 from tests.workspace import SCENES
+
+
+def suite_of(**fields: Any) -> Suite:
+    """A suite of these fields; pictures are as small as can be."""
+    images = {"size_px": 128, **fields.pop("images", {})}
+    whole = {"name": "s", "models": ["oracle"], "images": images, **fields}
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "suite.yaml"
+        path.write_text(yaml.safe_dump(whole), encoding="utf-8")
+        return load_suite(path)
+
+
+def track_of(
+    name: str,
+    tasks: Sequence[AssemblyTask] = TASKS,
+    shop: Workshop | None = None,
+    limit: int | None = None,
+    **fields: Any,
+) -> Any:
+    """A track about these scenes; with prompts and pictures where there is a shop to draw them."""
+    suite = suite_of(tracks=[name], **fields)
+    dataset = Dataset("test", Path("."), tuple(tasks))
+    (track,) = open_tracks(suite, dataset, limit, shop)
+    return track
+
+
+def seesaw() -> AssemblyTask:
+    """A bar that tips unless the second cube is there before it; nothing says so but physics."""
+    blocks = (
+        Block(1, "cube", "red", (0, 0, 0.025), (0, 0, 0), (), 1),
+        Block(2, "cube", "blue", (0.11, 0, 0.025), (0, 0, 0), (), 1),
+        Block(3, "cuboid3", "yellow", (0.055, 0, 0.0625), (0, 0, 0), (1,), 2),
+    )
+    numbered = tuple(Candidate(b.type, b.color, b.euler_deg) for b in blocks)
+    return AssemblyTask(Scene("seesaw", (2,), blocks, ("seesaw",)), CandidateSet(numbered))
 
 
 @pytest.fixture(scope="session")

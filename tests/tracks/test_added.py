@@ -30,8 +30,7 @@ from phyblock.tracks.base import Judgement, SceneTrack, kind_of
 from phyblock.tracks.full_planning import FullPlanning
 from phyblock.tracks.measures import LayoutColumn, Measure, SampleCounts, TrackReport
 from phyblock.web.board import SiteRun, Sources, board_of, entries_of, values_of
-from tests.vqa_set import write_questions
-from tests.workspace import Workspace, call
+from tests.workspace import Workspace, call, write_questions
 
 
 def needless_steps(task: Any, record: Any) -> tuple[float, float]:

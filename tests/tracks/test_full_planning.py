@@ -16,7 +16,7 @@ from phyblock.domain.scene import AssemblyTask, Block, Candidate, CandidateSet, 
 from phyblock.tracks.base import presented
 from phyblock.tracks.full_planning import pose_choices, pose_counts
 from phyblock.tracks.goal_blind import goal_blind_plans
-from tests.tracks.opened import track_of
+from tests.tracks.conftest import track_of
 
 
 @pytest.fixture(scope="module")

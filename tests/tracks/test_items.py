@@ -17,7 +17,7 @@ from phyblock.records.record import Reply
 from phyblock.tracks.base import file_plan, in_order, presented, shown_order, spread, stratified
 from phyblock.tracks.difficulty import MEASURES, distractor_distance, log_orders
 from tests.shipped import TASKS
-from tests.tracks.opened import track_of
+from tests.tracks.conftest import track_of
 from tests.workspace import call
 
 SIZES = st.lists(st.integers(1, 200), min_size=1, max_size=4)

@@ -120,7 +120,6 @@ def composite_task(tasks: tuple[AssemblyTask, ...], tmp_path: Path) -> AssemblyT
 def test_the_data_sets_picture_is_sent_byte_for_byte_or_parted_in_two_halves(
     composite_task, tmp_path, order
 ):
-    assert composite_task.composite is not None
     (((picture,),), drawn) = draw(tmp_path / "cache", OWN, [composite_task])
     assert picture.data == composite_task.composite.read_bytes()
     assert (picture.label, picture.width_px, picture.height_px, drawn) == ("composite", 514, 256, 0)

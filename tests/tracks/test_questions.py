@@ -32,9 +32,8 @@ from phyblock.tracks.questions import (
     question_drawings,
     select_questions,
 )
-from tests.tracks.opened import track_of
-from tests.vqa_set import write_questions
-from tests.workspace import Workspace
+from tests.tracks.conftest import track_of
+from tests.workspace import Workspace, write_questions
 
 STYLE = PictureStyle(size_px=128)
 LEVELS = (1, 2, 3, 4)

@@ -15,8 +15,7 @@ import pytest
 
 from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat
-from tests.vqa_set import questions, write_questions
-from tests.workspace import Workspace
+from tests.workspace import Workspace, questions, write_questions
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, BrowserContext, Locator, LocatorAssertions, Page

@@ -222,7 +222,6 @@ def test_a_sample_is_drawn_played_and_turned(visiting, made):
     picture = "canvas => canvas.toDataURL()"
     before = [page.eval_on_selector(view, picture) for view in (stage, goal)]
     box = page.locator(stage).bounding_box()
-    assert box is not None
     page.mouse.move(box["x"] + 100, box["y"] + 100)
     page.mouse.down()
     page.mouse.move(box["x"] + 160, box["y"] + 80)

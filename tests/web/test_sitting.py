@@ -17,9 +17,8 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from tests.fork_server import Forked, fork_server
-from tests.vqa_set import questions, write_questions
 from tests.web.conftest import Visit
-from tests.workspace import SCENES, Raw, Workspace
+from tests.workspace import SCENES, Raw, Workspace, questions, write_questions
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page

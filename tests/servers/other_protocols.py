@@ -1,4 +1,4 @@
-"""A server that speaks the Gemini generateContent protocol."""
+"""Servers that speak the Anthropic Messages protocol, and the Gemini generateContent protocol."""
 
 from __future__ import annotations
 
@@ -9,6 +9,57 @@ from typing import Any
 from aiohttp import web
 
 from tests.servers.chassis import LocalServer, Seen
+
+
+class AnthropicMessages(LocalServer):
+    """POST /v1/messages; there is no seed in this protocol."""
+
+    def add_routes(self, app: web.Application) -> None:
+        app.router.add_post("/v1/messages", self.handle)
+
+    def read(self, body: dict[str, Any], request: web.Request) -> Seen:
+        system = body.get("system", "")
+        if not isinstance(system, str):
+            system = "".join(block["text"] for block in system)
+        parts: list[str | tuple[str, str]] = []
+        for message in body["messages"]:
+            content = message["content"]
+            parts += [content] if isinstance(content, str) else map(_block, content)
+        params = {k: v for k, v in body.items() if k not in ("model", "messages", "system")}
+        key = request.headers.get("x-api-key", "")
+        return Seen(body["model"], system, tuple(parts), params, body.get("seed"), key, body)
+
+    def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
+        stop = {"length": "max_tokens", "filtered": "refusal"}.get(ending, "end_turn")
+        text = "" if ending in ("length", "filtered", "blank") else seen.reply_text
+        body = {
+            "id": f"msg_{seen.sample}",
+            "type": "message",
+            "role": "assistant",
+            "model": seen.model,
+            "content": [
+                {"type": "thinking", "thinking": "Let me see.", "signature": "c2ln"},
+                {"type": "text", "text": text},
+            ],
+            "stop_reason": stop,
+            "stop_sequence": None,
+            "usage": {"input_tokens": 1000, "output_tokens": 40},
+        }
+        return {"type": "message"} if ending == "empty" else body
+
+    def error(self, status: int, ending: str, message: str) -> dict[str, Any]:
+        kinds = {429: "rate_limit_error", 500: "api_error", 401: "authentication_error"}
+        kind = kinds.get(status, "invalid_request_error")
+        if ending == "policy":
+            message = "Output blocked by content filtering policy"
+        return {"type": "error", "error": {"type": kind, "message": message}}
+
+
+def _block(part: dict[str, Any]) -> str | tuple[str, str]:
+    if part["type"] == "text":
+        return part["text"]
+    source = part["source"]
+    return source["media_type"], hashlib.sha256(base64.b64decode(source["data"])).hexdigest()
 
 
 class GeminiGenerate(LocalServer):
@@ -56,8 +107,7 @@ class GeminiGenerate(LocalServer):
 
 def _part(part: dict[str, Any]) -> str | tuple[str, str]:
     if "text" in part:
-        text: str = part["text"]
-        return text
+        return part["text"]
     data = part.get("inline_data") or part["inlineData"]
     mime = data.get("mime_type") or data["mimeType"]
     return mime, hashlib.sha256(base64.b64decode(data["data"])).hexdigest()

@@ -1,1 +1,0 @@
-"""Local servers that speak the providers' protocols, with faults on demand."""
