@@ -12,7 +12,6 @@ Requests are compared by a digest of all bodies that a local server received.
 from __future__ import annotations
 
 import argparse
-import csv
 import hashlib
 import json
 import shutil
@@ -26,7 +25,7 @@ from tests.conftest import official_root
 from tests.fork_server import end_fork_server
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
-from tests.workspace import Workspace
+from tests.workspace import Workspace, csv_rows
 
 GOLDEN = Path(__file__).with_name("golden.json")
 
@@ -71,8 +70,7 @@ def rows_digests(path: Path) -> dict[str, str]:
 
     The order of rows changes nothing.
     """
-    with path.open(encoding="utf-8", newline="") as file:
-        rows = list(csv.DictReader(file))
+    rows = csv_rows(path)
     columns = KEY_COLUMNS if path.name == "estimates.csv" else tuple(rows[0] if rows else ())
     by_model: defaultdict[str, list[str]] = defaultdict(list)
     for row in rows:

@@ -4,16 +4,17 @@ question sets of every subtask, whose right answers are drawn.
 
 from __future__ import annotations
 
+import asyncio
 import csv
-import io
+import functools
 import json
 import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Coroutine, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import yaml
@@ -23,6 +24,7 @@ from phyblock.domain.question import CATEGORIES, LETTERS, SUBTASKS
 from tests.fork_server import ONE_THREAD, Done, Forked, fork_server
 
 Raw = dict[str, Any]
+T = TypeVar("T")
 
 SHARED = ("pictures", "goal-blind")
 """Folders of the cache."""
@@ -41,6 +43,16 @@ def call(*words: object) -> int:
     return phyblock.main([str(word) for word in words], standalone_mode=False) or 0
 
 
+def in_a_loop(work: Callable[..., Coroutine[Any, Any, T]]) -> Callable[..., T]:
+    """Make an asynchronous test an ordinary one."""
+
+    @functools.wraps(work)
+    def run(*args: Any, **options: Any) -> T:
+        return asyncio.run(work(*args, **options))
+
+    return run
+
+
 def invoked(*words: object, **env: str) -> Result:
     """Give a command in this process; its output, and what it raises."""
     from phyblock.cli.main import phyblock
@@ -49,6 +61,22 @@ def invoked(*words: object, **env: str) -> Result:
     return runner.invoke(
         phyblock, [*map(str, words)], standalone_mode=False, catch_exceptions=False
     )
+
+
+def write_lines(path: Path, rows: Iterable[object]) -> Path:
+    """Write a row of JSON a line."""
+    path.write_text("".join(json.dumps(row) + "\n" for row in rows), encoding="utf-8")
+    return path
+
+
+def read_lines(path: Path) -> list[Raw]:
+    return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+
+
+def csv_rows(path: Path, **options: Any) -> list[dict[str, str]]:
+    """The rows of a CSV file by the names of its columns."""
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file, **options))
 
 
 def candidates() -> list[Raw]:
@@ -133,8 +161,7 @@ class Workspace:
         """`data/scenes.jsonl`."""
         folder = self.root / "data"
         folder.mkdir(exist_ok=True)
-        text = "".join(json.dumps(scene) + "\n" for scene in scenes or SCENES)
-        (folder / "scenes.jsonl").write_text(text, encoding="utf-8")
+        write_lines(folder / "scenes.jsonl", scenes or SCENES)
         return folder
 
     def write_suite(self, *, name: str = "trial", **fields: Any) -> Path:
@@ -223,7 +250,7 @@ class Workspace:
         if not path.exists():
             assert (path.parent / "run.yaml").exists(), "nothing has run"
             return []
-        return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+        return read_lines(path)
 
     def tables(self, folder: Path | None = None) -> dict[str, bytes]:
         """The table files of a run by name."""
@@ -231,7 +258,7 @@ class Workspace:
 
     def rows(self, table: str) -> list[Raw]:
         """The rows of a table, as its CSV file has them."""
-        return list(csv.DictReader(io.StringIO(self.tables()[f"{table}.csv"].decode())))
+        return csv_rows(self.out / "tables" / f"{table}.csv")
 
     def files(self) -> dict[str, bytes]:
         """Every file below the folder but pictures, by relative path."""
@@ -301,8 +328,7 @@ def questions(
 def write_questions(folder: Path, made: Sequence[Raw] | None = None) -> Path:
     """`questions.jsonl` in a folder."""
     folder.mkdir(exist_ok=True)
-    lines = (json.dumps(one) + "\n" for one in (questions() if made is None else made))
-    (folder / "questions.jsonl").write_text("".join(lines), encoding="utf-8")
+    write_lines(folder / "questions.jsonl", questions() if made is None else made)
     return folder
 
 

@@ -30,8 +30,7 @@ VERBS = tuple(phyblock.list_commands(None))
 CALLS = re.compile(rf"\bphyblock ((?:{'|'.join(VERBS)})\b[^\n`;|&>\"#]*)")
 LIBRARIES = tuple(ENGINES)
 HEAVY = ("litellm", *LIBRARIES, "pandas", "aiohttp", "matplotlib", "phyblock.making")
-SCRIPT = """
-import sys
+COMMANDS = """
 from phyblock.cli.main import main
 for words in sys.argv[1:]:
     sys.argv = ["phyblock", *words.split()]
@@ -39,20 +38,31 @@ for words in sys.argv[1:]:
         main()
     except SystemExit as ending:
         assert not ending.code
-sys.stderr.write(" ".join({n.split(".")[0] for n in sys.modules}))
 """
+PACKAGES = '\nsys.stderr.write(" ".join({name.split(".")[0] for name in sys.modules}))'
 
 
-def ask(*commands: str) -> tuple[str, set[str]]:
-    """Return what commands print, and the packages that they imported."""
-    done = subprocess.run(
-        [sys.executable, "-c", SCRIPT, *commands], capture_output=True, text=True, check=True
-    )
+def ran(code: str, *words: str) -> tuple[str, set[str]]:
+    """Return what code prints, and the packages that it imports."""
+    command = [sys.executable, "-c", f"import sys\n{code}{PACKAGES}", *words]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
     return done.stdout, set(done.stderr.split())
 
 
+@pytest.mark.parametrize(
+    ("modules", "heavy"),
+    [
+        ("phyblock", ("numpy", "pandas", "litellm", "aiohttp", "pydantic", "yaml", "click")),
+        ("phyblock.results.load, phyblock.results.tables", ("litellm", "rich", "matplotlib")),
+    ],
+)
+def test_importing_what_a_program_needs_imports_nothing_heavy(modules, heavy):
+    _, imported = ran(f"import {modules}")
+    assert not imported & {*heavy, *LIBRARIES, "aiohttp"}
+
+
 def test_help_names_every_verb_and_imports_nothing_heavy():
-    told, imported = ask("--help")
+    told, imported = ran(COMMANDS, "--help")
     for verb in VERBS:
         assert f"\n  {verb} " in told
     assert "phyblock run quick" in told
@@ -61,7 +71,7 @@ def test_help_names_every_verb_and_imports_nothing_heavy():
 
 def test_help_of_verbs_and_version_import_nothing_heavy():
     verbs = ("run", "report", "score", "validate", "models", "cache", "init")
-    told, imported = ask("--version", *(f"{verb} --help" for verb in verbs))
+    told, imported = ran(COMMANDS, "--version", *(f"{verb} --help" for verb in verbs))
     assert told.startswith("phyblock, version ")
     for verb in verbs:
         assert f"Usage: phyblock {verb} " in told

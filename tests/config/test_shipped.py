@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import csv
 import json
 import os
 import re
@@ -23,6 +22,7 @@ from phyblock.config.yaml import read_yaml
 from phyblock.errors import SpecError
 from tests.documents import SCHEMAS
 from tests.fuzz.strategies import SOUND_SUITES
+from tests.workspace import csv_rows
 
 ROOT = Path(__file__).parents[2]
 SUITES = sorted((ROOT / "benchmarks").glob("*.yaml"))
@@ -71,9 +71,7 @@ def test_the_list_is_that_of_the_papers_tables(official_dir):
     tables = sorted((official_dir / "paper").glob("table*.csv"))
     assert tables
     for table in tables:
-        with table.open(encoding="utf-8", newline="") as file:
-            rows = {row["model"] for row in csv.DictReader(file)}
-        assert rows - {"Random"} <= named
+        assert {row["model"] for row in csv_rows(table)} - {"Random"} <= named
 
 
 LITELLM_CHECK = """

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-Raw = dict[str, Any]
+from tests.workspace import Raw, write_lines
 
 
 def sound_scene() -> Raw:
@@ -65,9 +65,7 @@ def _holder(document: Any, path: Keys) -> tuple[Any, Any]:
 
 def write_scenes(folder: Path, *scenes: Raw) -> Path:
     """A data set folder with one scene a line."""
-    text = "".join(json.dumps(scene) + "\n" for scene in scenes)
-    (folder / "scenes.jsonl").write_text(text, encoding="utf-8")
-    return folder
+    return write_lines(folder / "scenes.jsonl", scenes).parent
 
 
 def write_checkout(root: Path, *scenes: Raw) -> Path:

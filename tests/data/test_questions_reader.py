@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import copy
-import json
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,7 @@ from phyblock.domain.scene import Block
 from phyblock.errors import DataError
 from tests.data.broken import sound_scene, without, write_scenes
 from tests.fuzz.strategies import QUESTIONS
-from tests.workspace import tower
+from tests.workspace import tower, write_lines
 
 QUESTION: dict[str, Any] = {
     "id": "co-001",
@@ -43,9 +42,7 @@ def scenes(tmp_path: Path) -> Dataset:
 
 def write(folder: Path, *questions: Any) -> Path:
     folder.mkdir(exist_ok=True)
-    text = "".join(json.dumps(question) + "\n" for question in questions)
-    (folder / "questions.jsonl").write_text(text, encoding="utf-8")
-    return folder
+    return write_lines(folder / "questions.jsonl", questions).parent
 
 
 def read_one(folder: Path, scenes: Dataset, question: Any) -> QuestionTask:

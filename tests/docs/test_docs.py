@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import csv
 import os
 import re
 import subprocess
@@ -15,7 +14,7 @@ import pytest
 
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
-from tests.workspace import Workspace
+from tests.workspace import Workspace, csv_rows
 
 DOCS = Path(__file__).parents[2] / "docs"
 ADDRESS = "http://localhost:8000"
@@ -128,12 +127,8 @@ def test_a_plugin_is_in_tables_and_on_the_page(section, workspace):
     follow(text, workspace)
     folder, measure, values, table, word = SHOWN[section]
     run = workspace.root / "reader" / "results" / folder
-    with (run / "tables" / "estimates.csv").open(newline="", encoding="utf-8") as file:
-        rows = [
-            row
-            for row in csv.DictReader(file)
-            if row["measure"] == measure and row["cell"] == "overall"
-        ]
+    rows = csv_rows(run / "tables" / "estimates.csv")
+    rows = [row for row in rows if (row["measure"], row["cell"]) == (measure, "overall")]
     for model, value in values.items():
         (found, *_) = [row for row in rows if row["model"] == model]
         assert found["lo"] <= found["value"] <= found["hi"]

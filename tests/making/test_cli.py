@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 import importlib.util
 import io
-import json
 import os
 import re
 import signal
@@ -26,7 +24,7 @@ from phyblock.files import LIST, bundled
 from phyblock.making.scenes.production import Production, Share
 from phyblock.sim.engine import other_engine
 from phyblock.workers import open_workers
-from tests.workspace import SCENES, invoked, tower
+from tests.workspace import SCENES, csv_rows, invoked, read_lines, tower, write_lines
 
 ALONE = ("--jobs", 1)
 SMALL = ("--subtasks", "CO,OC", "--per-subtask", 4, *ALONE)
@@ -49,10 +47,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_what_is_made_is_verified_and_a_changed_scene_is_named(folder, tmp_path):
     assert "few: all checks passed" in scenes("verify", *ALONE, folder).stdout
-    lines = (folder / "scenes.jsonl").read_text(encoding="utf-8").splitlines()
-    spoiled = json.loads(lines[0])
+    spoiled = read_lines(folder / "scenes.jsonl")[0]
     spoiled["blocks"][-1]["position"][2] += 0.01
-    (tmp_path / "scenes.jsonl").write_text(json.dumps(spoiled) + "\n", encoding="utf-8")
+    write_lines(tmp_path / "scenes.jsonl", [spoiled])
     (tmp_path / "SHA256SUMS").write_text(f"{'0' * 64}  scenes.jsonl\n", encoding="utf-8")
     done = scenes("verify", *ALONE, tmp_path)
     assert done.return_value == 1
@@ -165,9 +162,7 @@ def data(tmp_path: Path) -> Path:
     spoiled["blocks"][2] |= {"depend": [1], "layer": 2}
     folder = tmp_path / "data"
     folder.mkdir()
-    text = "".join(json.dumps(scene) + "\n" for scene in (*SCENES, spoiled))
-    (folder / "scenes.jsonl").write_text(text, encoding="utf-8")
-    return folder
+    return write_lines(folder / "scenes.jsonl", [*SCENES, spoiled]).parent
 
 
 def test_an_audit_lists_findings(data, tmp_path):
@@ -177,7 +172,7 @@ def test_an_audit_lists_findings(data, tmp_path):
     assert "5 stand when finished, 5 at every step as well" in told
     assert "block 3 floats 20.00 mm above its support" in told
     assert "3 green cube" in told
-    rows = list(csv.DictReader(io.StringIO(table.read_text(encoding="utf-8"))))
+    rows = csv_rows(table)
     assert {row["check"] for row in rows if row["scene"] == "t6"} >= {"floating", "unstable"}
     with (data / "scenes.jsonl").open("a", encoding="utf-8") as file:
         file.write("{}\n")
@@ -222,8 +217,7 @@ def asked(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def questions_of(folder: Path) -> list[dict[str, Any]]:
-    text = (folder / QUESTION_LINES).read_text(encoding="utf-8")
-    return [json.loads(line) for line in text.splitlines()]
+    return read_lines(folder / QUESTION_LINES)
 
 
 def test_questions_are_written_with_card_and_checksums(asked):
@@ -248,8 +242,7 @@ def test_answers_are_derived_again_and_a_corrupted_one_is_named(asked, tmp_path)
     found = questions_of(asked / "q")
     right = found[2]["answer"]
     found[2]["answer"] = "ABCD"["BCDA".index(right)]
-    text = "".join(json.dumps(one) + "\n" for one in found)
-    (tmp_path / QUESTION_LINES).write_text(text, encoding="utf-8")
+    write_lines(tmp_path / QUESTION_LINES, found)
     for name in ("CARD.md", "SHA256SUMS"):
         (tmp_path / name).write_bytes((asked / "q" / name).read_bytes())
     done = vqa("verify", tmp_path, "--data", asked, *ALONE)
@@ -273,8 +266,7 @@ def test_a_question_is_shown_with_its_pictures(asked, tmp_path):
 def test_an_audit_says_what_it_finds(asked, tmp_path):
     found = questions_of(asked / "q")
     again = {**found[0], "id": "co-009"}
-    text = "".join(json.dumps(one) + "\n" for one in [*found, again])
-    (tmp_path / QUESTION_LINES).write_text(text, encoding="utf-8")
+    write_lines(tmp_path / QUESTION_LINES, [*found, again])
     pytest.importorskip("sklearn")
     done = vqa("audit", tmp_path, "--data", asked)
     assert "co-009: asks what an earlier question asks" in done.stdout

@@ -17,7 +17,7 @@ from phyblock.making.checks import verify_scene
 from phyblock.making.files import check_sums
 from phyblock.making.scenes.completing import GivenScene, ReadScene, complete, derived, read_given
 from tests.shipped import TASKS
-from tests.workspace import SCENES
+from tests.workspace import SCENES, write_lines
 
 GABLES = [
     {"type": "cube", "color": "red", "position": [0, -0.05, 0.025]},
@@ -120,7 +120,7 @@ def test_scenes_are_read_in_any_form(tmp_path, form):
     elif form == "named.json":
         path.write_text(json.dumps({"scenes": [one]}), encoding="utf-8")
     elif form == "lines.jsonl":
-        path.write_text(json.dumps(one) + "\n", encoding="utf-8")
+        write_lines(path, [one])
     else:
         path.mkdir()
         (path / "gables.json").write_text(json.dumps({"blocks": GABLES}), encoding="utf-8")

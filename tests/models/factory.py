@@ -10,7 +10,7 @@ import threading
 from collections.abc import Callable, Collection, Coroutine, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from phyblock.config.models import ModelConfig
 from phyblock.domain.scene import Block, Candidate, CandidateSet, Scene
@@ -26,8 +26,6 @@ from tests.servers.chassis import LocalServer
 from tests.servers.openai_chat import OpenAIChat
 from tests.servers.other_protocols import AnthropicMessages, GeminiGenerate
 from tests.workspace import KEY_VARIABLE
-
-T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -159,11 +157,6 @@ def reply_of(model: Model, request: Request) -> Reply:
     (answer,) = ask(model, request)
     assert isinstance(answer, Reply), answer
     return answer
-
-
-def run(main: Callable[[], Coroutine[Any, Any, T]]) -> T:
-    """Run a coroutine function in a loop of its own."""
-    return asyncio.run(main())
 
 
 POLL_S = 0.01

@@ -36,11 +36,11 @@ from tests.models.factory import (
     ask,
     make_model,
     make_request,
-    run,
     with_fields,
 )
 from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat
+from tests.workspace import in_a_loop
 
 
 def config(model_id: str, **fields: object) -> ModelConfig:
@@ -133,28 +133,26 @@ def test_a_model_without_a_price_under_a_budget_is_an_error_at_the_start():
     st.floats(0.1, 10),
     st.lists(st.tuples(st.floats(0.01, 3), st.floats(0, 1), st.integers(0, 3)), max_size=30),
 )
-def test_a_budget_is_never_passed_and_stops_only_when_nothing_more_fits(limit, calls):
-    async def main() -> None:
-        budget = Budget(limit)
-        own = budget.of("m")
-        refused: list[float] = []
+@in_a_loop
+async def test_a_budget_is_never_passed_and_stops_only_when_nothing_more_fits(limit, calls):
+    budget = Budget(limit)
+    own = budget.of("m")
+    refused: list[float] = []
 
-        async def call(most: float, share: float, steps: int) -> None:
-            try:
-                held = await own.reserve(lambda: most)
-            except BudgetReachedError:
-                refused.append(most)
-                assert budget.spent_usd + most > limit
-                return
-            for _ in range(steps):
-                await asyncio.sleep(0)
-            own.settle(held, most * share)
-            assert budget.spent_usd <= limit + 1e-9
-
-        await asyncio.gather(*(call(*one) for one in calls))
+    async def call(most: float, share: float, steps: int) -> None:
+        try:
+            held = await own.reserve(lambda: most)
+        except BudgetReachedError:
+            refused.append(most)
+            assert budget.spent_usd + most > limit
+            return
+        for _ in range(steps):
+            await asyncio.sleep(0)
+        own.settle(held, most * share)
         assert budget.spent_usd <= limit + 1e-9
 
-    run(main)
+    await asyncio.gather(*(call(*one) for one in calls))
+    assert budget.spent_usd <= limit + 1e-9
 
 
 strange = st.one_of(
@@ -195,67 +193,63 @@ def test_only_counts_that_can_be_true_are_known(prompt, completion, reasoning, a
     st.lists(st.tuples(st.integers(1, 90_000), st.integers(1, 9000)), min_size=1, max_size=40),
     st.integers(1, 16),
 )
-def test_a_call_costs_no_more_than_was_held_once_a_reply_like_it_has_come(limit, told, width):
+@in_a_loop
+async def test_a_call_costs_no_more_than_was_held_once_a_reply_like_it_has_come(limit, told, width):
     """Whatever a server counts, the limit is passed at most by calls that were under way then.
 
     The first call is alone, and never are more under way than one more than were answered.
     """
     expected = Estimate(1000, 100, 100)
 
-    async def main() -> None:
-        budget = Budget(limit)
-        own = budget.of("m", Tariff(input=10.0, output=100.0))
-        room = asyncio.Semaphore(width)
-        longest, over_usd, under_way, answered = (0, 0), 0.0, 0, 0
+    budget = Budget(limit)
+    own = budget.of("m", Tariff(input=10.0, output=100.0))
+    room = asyncio.Semaphore(width)
+    longest, over_usd, under_way, answered = (0, 0), 0.0, 0, 0
 
-        async def call(tokens: tuple[int, int]) -> None:
-            nonlocal longest, over_usd, under_way, answered
-            async with room:
-                known = (0, 0)
-                try:
-                    held = await own.reserve(lambda: own.most_usd(expected) or 0.0)
-                except BudgetReachedError:
-                    return
-                known, held_usd = longest, own.most_usd(expected) or 0.0
-                under_way += 1
-                assert under_way <= answered + 1
-                await asyncio.sleep(0)
-                prompt, reply = tokens
-                usd = (10.0 * prompt + 100.0 * reply) / 1e6
-                if prompt <= known[0] and reply <= known[1]:
-                    assert usd <= held_usd
-                over_usd += max(0.0, usd - held_usd)
-                own.learn(expected, Usage(prompt_tokens=prompt, completion_tokens=reply))
-                own.settle(held, usd)
-                longest = (max(longest[0], prompt), max(longest[1], reply))
-                under_way, answered = under_way - 1, answered + 1
-                assert budget.spent_usd <= limit + over_usd + 1e-9
+    async def call(tokens: tuple[int, int]) -> None:
+        nonlocal longest, over_usd, under_way, answered
+        async with room:
+            known = (0, 0)
+            try:
+                held = await own.reserve(lambda: own.most_usd(expected) or 0.0)
+            except BudgetReachedError:
+                return
+            known, held_usd = longest, own.most_usd(expected) or 0.0
+            under_way += 1
+            assert under_way <= answered + 1
+            await asyncio.sleep(0)
+            prompt, reply = tokens
+            usd = (10.0 * prompt + 100.0 * reply) / 1e6
+            if prompt <= known[0] and reply <= known[1]:
+                assert usd <= held_usd
+            over_usd += max(0.0, usd - held_usd)
+            own.learn(expected, Usage(prompt_tokens=prompt, completion_tokens=reply))
+            own.settle(held, usd)
+            longest = (max(longest[0], prompt), max(longest[1], reply))
+            under_way, answered = under_way - 1, answered + 1
+            assert budget.spent_usd <= limit + over_usd + 1e-9
 
-        await asyncio.gather(*map(call, told))
-
-    run(main)
+    await asyncio.gather(*map(call, told))
 
 
 amounts = st.one_of(st.none(), st.floats(), st.floats(0, 2))
 
 
 @given(st.lists(st.tuples(st.floats(0.01, 2), amounts), max_size=30))
-def test_what_was_spent_never_becomes_less_and_an_unknown_cost_is_the_dearest(calls):
-    async def main() -> None:
-        budget = Budget(1000.0)
-        own = budget.of("m")
-        for most, cost in calls:
-            before = budget.spent_usd
-            try:
-                held = await own.reserve(functools.partial(float, most))
-            except BudgetReachedError:
-                break
-            counted = own.settle(held, cost)
-            is_known = cost is not None and 0 <= cost < float("inf")
-            assert counted == (cost if is_known else most)
-            assert budget.spent_usd == before + counted >= before
-
-    run(main)
+@in_a_loop
+async def test_what_was_spent_never_becomes_less_and_an_unknown_cost_is_the_dearest(calls):
+    budget = Budget(1000.0)
+    own = budget.of("m")
+    for most, cost in calls:
+        before = budget.spent_usd
+        try:
+            held = await own.reserve(functools.partial(float, most))
+        except BudgetReachedError:
+            break
+        counted = own.settle(held, cost)
+        is_known = cost is not None and 0 <= cost < float("inf")
+        assert counted == (cost if is_known else most)
+        assert budget.spent_usd == before + counted >= before
 
 
 @given(st.lists(st.tuples(st.integers(0, 5000), st.none() | st.integers(0, 10**9)), max_size=20))
@@ -293,14 +287,15 @@ def test_a_server_that_does_not_count_stops_within_the_limit(route, usage):
         tariff = Tariff(input=10.0, output=100.0)
         dearest = most_usd(tariff, asked.prompt_tokens, asked.most_completion_tokens)
 
-        async def main() -> list[Reply | BaseException | None]:
+        @in_a_loop
+        async def ask_all() -> list[object]:
             model = make_model(config, budget=budget)
             calls = (model.ask(make_request(f"{n:03}")) for n in range(40))
-            answers = await asyncio.gather(*calls, return_exceptions=True)
+            found = await asyncio.gather(*calls, return_exceptions=True)
             await model.aclose()
-            return list(answers)
+            return found
 
-        answers = run(main)
+        answers = ask_all()
     replies = [answer for answer in answers if isinstance(answer, Reply)]
     assert {type(answer) for answer in answers} == {Reply, BudgetReachedError}
     assert 0 < len(replies) == server.requests <= 0.1 / dearest

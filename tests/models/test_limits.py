@@ -23,8 +23,9 @@ from phyblock.models.client import HttpClient
 from phyblock.models.costs import Budget
 from phyblock.models.model import WINDOW_S, Clock, Limits, RetryPolicy
 from phyblock.records.record import Reply
-from tests.models.factory import ROUTES, make_model, make_request, run
+from tests.models.factory import ROUTES, make_model, make_request
 from tests.servers.chassis import Faults, Running
+from tests.workspace import in_a_loop
 
 
 class FakeTime:
@@ -76,118 +77,107 @@ calls = st.lists(
 
 @settings(max_examples=100, deadline=None)
 @given(calls, st.integers(1, 10), st.integers(100, 500), st.integers(1, 8))
-def test_no_window_of_a_minute_has_more_starts_or_tokens_than_allowed(arrivals, rpm, tpm, width):
+@in_a_loop
+async def test_no_window_of_a_minute_has_more_starts_or_tokens_than_allowed(
+    arrivals, rpm, tpm, width
+):
     starts: list[tuple[float, int]] = []
     inside = 0
+    time = FakeTime()
+    limits = Limits(width, asyncio.Semaphore(width), rpm, tpm, clock=time.clock)
 
-    async def main() -> None:
-        time = FakeTime()
-        limits = Limits(width, asyncio.Semaphore(width), rpm, tpm, clock=time.clock)
+    async def call(at_s: float, tokens: int, takes_s: float) -> None:
+        nonlocal inside
+        await time.sleep(at_s)
+        async with limits.slot(tokens) as started:
+            starts.append((time.now_s, tokens))
+            inside += 1
+            assert inside <= width
+            await time.sleep(takes_s)
+            inside -= 1
+            limits.settle(started, tokens)
 
-        async def call(at_s: float, tokens: int, takes_s: float) -> None:
-            nonlocal inside
-            await time.sleep(at_s)
-            async with limits.slot(tokens) as started:
-                starts.append((time.now_s, tokens))
-                inside += 1
-                assert inside <= width
-                await time.sleep(takes_s)
-                inside -= 1
-                limits.settle(started, tokens)
-
-        await time.run_until_done(*(asyncio.create_task(call(*one)) for one in arrivals))
-
-    run(main)
+    await time.run_until_done(*(asyncio.create_task(call(*one)) for one in arrivals))
     assert len(starts) == len(arrivals)
     requests, tokens = busiest_window(starts)
     assert requests <= rpm
     assert tokens <= tpm
 
 
-def starts_of(tpm: int, *calls: tuple[int, int]) -> list[float]:
+@in_a_loop
+async def starts_of(tpm: int, *calls: tuple[int, int]) -> list[float]:
     """When calls start that were estimated at the first number of tokens and took the second."""
+    time = FakeTime()
+    limits = Limits(9, asyncio.Semaphore(9), tpm=tpm, clock=time.clock)
+    starts: list[float] = []
 
-    async def main() -> list[float]:
-        time = FakeTime()
-        limits = Limits(9, asyncio.Semaphore(9), tpm=tpm, clock=time.clock)
-        starts: list[float] = []
+    async def call(expected: int, taken: int) -> None:
+        async with limits.slot(expected) as started:
+            starts.append(time.now_s)
+            limits.settle(started, taken)
 
-        async def call(expected: int, taken: int) -> None:
-            async with limits.slot(expected) as started:
-                starts.append(time.now_s)
-                limits.settle(started, taken)
-
-        for expected, taken in calls:
-            await time.run_until_done(asyncio.create_task(call(expected, taken)))
-        return starts
-
-    return run(main)
+    for expected, taken in calls:
+        await time.run_until_done(asyncio.create_task(call(expected, taken)))
+    return starts
 
 
 def test_tokens_really_taken_replace_the_estimate():
+    """A request larger than the limit waits for an empty window only."""
     assert starts_of(100, (90, 10), (20, 20), (80, 80)) == [0, 0, WINDOW_S]
     assert starts_of(100, (10, 90), (20, 20)) == [0, WINDOW_S]
-
-
-def test_a_request_larger_than_the_limit_waits_for_an_empty_window_only():
     assert starts_of(100, (500, 500), (1, 1), (500, 500)) == [0, WINDOW_S, 2 * WINDOW_S]
 
 
-def test_a_model_waiting_for_its_minute_holds_no_place_that_another_could_use():
-    async def main() -> float:
-        time = FakeTime()
-        overall = asyncio.Semaphore(1)
-        slow = Limits(5, overall, rpm=1, clock=time.clock)
-        quick = Limits(5, overall, clock=time.clock)
-        finished_s = 0.0
+@in_a_loop
+async def test_a_model_waiting_for_its_minute_holds_no_place_that_another_could_use():
+    time = FakeTime()
+    overall = asyncio.Semaphore(1)
+    slow = Limits(5, overall, rpm=1, clock=time.clock)
+    quick = Limits(5, overall, clock=time.clock)
+    finished_s = 0.0
 
-        async def call(limits: Limits) -> None:
-            nonlocal finished_s
-            async with limits.slot(0):
-                await time.sleep(1)
-            if limits is quick:
-                finished_s = time.now_s
+    async def call(limits: Limits) -> None:
+        nonlocal finished_s
+        async with limits.slot(0):
+            await time.sleep(1)
+        if limits is quick:
+            finished_s = time.now_s
 
-        tasks = [asyncio.create_task(call(limits)) for limits in (slow, slow, slow, quick, quick)]
-        await time.run_until_done(*tasks)
-        return finished_s
-
-    assert run(main) < WINDOW_S
+    tasks = [asyncio.create_task(call(limits)) for limits in (slow, slow, slow, quick, quick)]
+    await time.run_until_done(*tasks)
+    assert finished_s < WINDOW_S
 
 
 @settings(max_examples=100, deadline=None)
 @given(st.lists(st.tuples(st.integers(0, 5), st.booleans()), max_size=30), st.integers(1, 4))
-def test_limits_survive_those_that_give_up(plans, width):
+@in_a_loop
+async def test_limits_survive_those_that_give_up(plans, width):
     """However many hold or wait and are cancelled, all places are free in the end."""
+    overall = asyncio.Semaphore(width)
+    limits = Limits(width + 1, overall)
+    inside = 0
 
-    async def main() -> None:
-        overall = asyncio.Semaphore(width)
-        limits = Limits(width + 1, overall)
-        inside = 0
+    async def hold(steps: int) -> None:
+        nonlocal inside
+        async with limits.slot(0):
+            inside += 1
+            assert inside <= width
+            try:
+                for _ in range(steps):
+                    await asyncio.sleep(0)
+            finally:
+                inside -= 1
 
-        async def hold(steps: int) -> None:
-            nonlocal inside
-            async with limits.slot(0):
-                inside += 1
-                assert inside <= width
-                try:
-                    for _ in range(steps):
-                        await asyncio.sleep(0)
-                finally:
-                    inside -= 1
-
-        tasks = []
-        for steps, cancel in plans:
-            task = asyncio.create_task(hold(steps))
-            tasks.append(task)
-            await asyncio.sleep(0)
-            if cancel:
-                task.cancel()
-        await asyncio.gather(*tasks, return_exceptions=True)
-        for _ in range(width):
-            await asyncio.wait_for(overall.acquire(), 1)
-
-    run(main)
+    tasks = []
+    for steps, cancel in plans:
+        task = asyncio.create_task(hold(steps))
+        tasks.append(task)
+        await asyncio.sleep(0)
+        if cancel:
+            task.cancel()
+    await asyncio.gather(*tasks, return_exceptions=True)
+    for _ in range(width):
+        await asyncio.wait_for(overall.acquire(), 1)
 
 
 class Script:
@@ -310,7 +300,7 @@ def test_a_request_under_way_is_answered_and_a_second_cancellation_gives_it_up(
             return answer, cache.get(reply_key(config, make_request())) is not None
 
     with Running(server) as running:
-        answer, is_kept = run(lambda: main(running.url))
+        answer, is_kept = asyncio.run(main(running.url))
     assert server.requests == 1
     if cancels == 1:
         assert isinstance(answer, Reply), answer
@@ -350,7 +340,7 @@ def test_whatever_is_waited_for_a_cancellation_ends_the_wait_and_nothing_is_sent
         return [answer]
 
     with Running(server) as running:
-        (answer,) = run(lambda: main(running.url))
+        (answer,) = asyncio.run(main(running.url))
     assert isinstance(answer, asyncio.CancelledError), answer
     assert server.requests == 1
 
@@ -374,5 +364,5 @@ def test_a_bug_of_ours_is_neither_sent_again_nor_charged(monkeypatch):
                 await model.ask(make_request())
             await model.aclose()
 
-        run(main)
+        asyncio.run(main())
         assert (calls, budget.spent_usd) == (1, 0.0)

@@ -21,7 +21,7 @@ from phyblock.models.costs import Budget
 from phyblock.models.model import FAILURES_TO_REST, ChatModel, Limits, RetryPolicy, Server, Servers
 from phyblock.models.request import Model, Request
 from phyblock.records.record import Reply
-from tests.models.factory import ROUTES, ask, make_model, make_request, run, with_fields
+from tests.models.factory import ROUTES, ask, make_model, make_request, with_fields
 from tests.models.test_limits import FakeTime
 from tests.servers.chassis import Faults, Running, kill, start
 from tests.servers.openai_chat import OpenAIChat
@@ -99,7 +99,7 @@ def ask_through(
 
         await time.run_until_done(*(asyncio.create_task(work()) for _ in range(width)))
 
-    run(main)
+    asyncio.run(main())
     return answers, told
 
 
@@ -263,7 +263,7 @@ def test_servers_that_die_in_the_middle_lose_nothing(route):
         await started[0][0].cleanup()
         return answers
 
-    answers = run(main)
+    answers = asyncio.run(main())
     assert [type(answer) for answer in answers] == [Reply] * 120
     # No sample was sent again but those that were under way at a server that died.
     asked: Counter[str] = sum((server.by_sample for server in servers), Counter())

@@ -4,7 +4,6 @@ of readings of the official recordings.
 
 from __future__ import annotations
 
-import csv
 import json
 from collections import Counter
 from pathlib import Path
@@ -15,6 +14,7 @@ from hypothesis import strategies as st
 
 from phyblock.parsing.plan import parse_plan
 from tests.shipped import reply_texts
+from tests.workspace import csv_rows
 
 N = 16
 COUNTS = Path(__file__).with_name("recordings.csv")
@@ -243,8 +243,7 @@ def test_every_recorded_reply_is_read_as_counted(official_checkout):
         counts["blocks"] += len(parsed.plan.steps)
         counts["dropped"] += len(parsed.dropped)
         counts["as_official"] += parsed.plan == official
-    with COUNTS.open(encoding="utf-8", newline="") as file:
-        known = {row.pop("model"): row for row in csv.DictReader(file)}
+    known = {row.pop("model"): row for row in csv_rows(COUNTS)}
     for model, counts in found.items():
         assert {name: str(counts[name]) for name in known[model]} == known[model], model
     assert found

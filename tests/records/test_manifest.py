@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -16,7 +15,7 @@ from phyblock.records.record import Call
 from phyblock.results.load import load_run
 from phyblock.run.rescore import rescore
 from tests.data.broken import YAML_TEXTS, Raw, plan_record
-from tests.workspace import Workspace
+from tests.workspace import Workspace, read_lines, write_lines
 
 IDENTITY = "5eed" * 16
 
@@ -124,9 +123,9 @@ def test_a_run_does_not_go_on_with_records_that_were_copied_in(runs, tmp_path):
         assert done.code == 2
         assert "records.jsonl:1: run: is of another run" in done.err
         assert path.read_bytes() == before
-        lines = [json.loads(line) for line in (whole / "records.jsonl").read_bytes().splitlines()]
+        lines = read_lines(whole / "records.jsonl")
         lines[2] |= {"key": "t9", "scene": "t9", "sample": "full_planning/random/t9/s0"}
-        path.write_text("".join(json.dumps(line) + "\n" for line in lines))
+        write_lines(path, lines)
         done = runs.run()
         assert done.code == 2
         assert "records.jsonl:3: sample: is of another run" in done.err

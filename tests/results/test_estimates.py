@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import math
-import subprocess
-import sys
 from collections import defaultdict
 from collections.abc import Iterable
 from typing import Any
@@ -23,8 +20,8 @@ from phyblock.results.estimates import Headline, all_estimates
 from phyblock.results.load import Run, load_run
 from phyblock.results.paper import beside_paper, published_frame
 from phyblock.scoring.plan import Counts
-from phyblock.sim.engine import ENGINES
 from tests.web.factory import LEVELS, laws, manifest, record, record_lists, run_of, score, write_run
+from tests.workspace import csv_rows
 
 
 @laws
@@ -55,18 +52,6 @@ def test_a_cut_last_line_is_passed_over_and_counted(tmp_path_factory, data):
     run = load_run(folder)
     assert run.records["model"].tolist() == ["alpha"]
     assert run.is_cut
-
-
-def test_reading_runs_needs_no_simulator_and_no_network():
-    heavy = {"litellm", "rich", "matplotlib", "aiohttp"}
-    heavy |= set(ENGINES)
-    code = (
-        "import sys, phyblock.results.load, phyblock.results.tables\n"
-        f"heavy = {heavy} & set(sys.modules)\n"
-        "sys.exit(repr(heavy) if heavy else 0)"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
 
 
 Records = list[dict[str, Any]]
@@ -335,13 +320,12 @@ def test_ours_stands_beside_the_published_number_of_the_same_cell():
 def test_the_published_numbers_come_out_of_the_official_counts(official_dir):
     scenes: dict[tuple[str, str], list[dict[str, Any]]] = defaultdict(list)
     levels: dict[str, set[int]] = defaultdict(set)
-    with (official_dir / "expected" / "assembly_counts.csv").open(newline="") as file:
-        for row in csv.DictReader(file):
-            counts = (int(row[name]) for name in ("tp", "fp", "fn"))
-            scenes[row["model"], row["scene"]].append(
-                score(*counts, criterion=row["criterion"], matcher="paper", setting=row["setting"])
-            )
-            levels[row["scene"]].add(int(row["level"]))
+    for row in csv_rows(official_dir / "expected" / "assembly_counts.csv"):
+        counts = (int(row[name]) for name in ("tp", "fp", "fn"))
+        scenes[row["model"], row["scene"]].append(
+            score(*counts, criterion=row["criterion"], matcher="paper", setting=row["setting"])
+        )
+        levels[row["scene"]].add(int(row["level"]))
     records = [
         record(model, scene, 0, scores) | {"levels": sorted(levels[scene])}
         for (model, scene), scores in scenes.items()

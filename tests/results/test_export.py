@@ -23,7 +23,7 @@ from phyblock.integrations.files import write_vlmevalkit
 from phyblock.results.export import export_frame, export_run
 from phyblock.results.load import load_run
 from tests.web.factory import LEVELS, manifest, record, score, write_run
-from tests.workspace import Workspace, write_questions
+from tests.workspace import Workspace, csv_rows, write_questions
 
 HF = "the package datasets is not installed"
 
@@ -117,8 +117,7 @@ def question_set(tmp_path_factory: pytest.TempPathFactory, scenes: Dataset) -> Q
 
 def rows_of(path: Path) -> list[dict[str, str]]:
     csv.field_size_limit(10**8)
-    with path.open(newline="", encoding="utf-8") as file:
-        return list(csv.DictReader(file, delimiter="\t"))
+    return csv_rows(path, delimiter="\t")
 
 
 def test_tsv_files_are_as_vlmevalkit_reads_them(question_set, scenes, tmp_path):

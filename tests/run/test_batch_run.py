@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 import re
 import signal
@@ -14,7 +13,7 @@ import pytest
 
 from tests.servers.batches import BatchFaults, BatchServer, OpenAIBatches
 from tests.servers.chassis import Running
-from tests.workspace import Workspace, questions, write_questions
+from tests.workspace import Workspace, questions, read_lines, write_questions
 
 POLLING = {"batch_poll_s": 0.05}
 
@@ -121,8 +120,8 @@ def finished(workspace: Workspace, server: BatchServer, samples: int) -> None:
     assert len(records) == samples
     assert {record["outcome"] for record in records} == {"ok"}
     assert counted_once(server, samples)
-    ids = [json.loads(line) for line in batches_of(workspace).splitlines()]
-    assert {line["batch"] for line in ids} >= {made.token for made in server.made if made.token}
+    batches = {line["batch"] for line in read_lines(workspace.out / "batches.jsonl")}
+    assert batches >= {made.token for made in server.made if made.token}
 
 
 def killed_at(workspace: Workspace, server: BatchServer, number: int) -> bool:
@@ -146,7 +145,3 @@ def killed_at(workspace: Workspace, server: BatchServer, number: int) -> bool:
         process.communicate()
     server.moment = lambda *_: None
     return reached.is_set()
-
-
-def batches_of(workspace: Workspace) -> str:
-    return (workspace.out / "batches.jsonl").read_text(encoding="utf-8")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import io
 import json
 import re
@@ -32,7 +31,7 @@ from tests.servers.billing import (
 )
 from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat, said
-from tests.workspace import KEY_VARIABLE, Workspace, questions, write_questions
+from tests.workspace import KEY_VARIABLE, Workspace, in_a_loop, questions, write_questions
 
 PRICE = {"input": 10.0, "output": 100.0}
 CALL_USD = 1000 * PRICE["input"] / 1e6 + 40 * PRICE["output"] / 1e6
@@ -191,14 +190,11 @@ def printed(plan: RunPlan, rows: list[Estimate]) -> str:
     return console.file.getvalue()
 
 
-def asked(workspace: Workspace, plan: RunPlan) -> None:
+@in_a_loop
+async def asked(workspace: Workspace, plan: RunPlan) -> None:
     """Ask everything of a plan; no tables are made."""
-
-    async def ask() -> None:
-        result = await Session(plan, workspace.out, lambda _: None, use_cache=False).run()
-        assert (result.left, result.failed) == (0, 0), result
-
-    asyncio.run(ask())
+    result = await Session(plan, workspace.out, lambda _: None, use_cache=False).run()
+    assert (result.left, result.failed) == (0, 0), result
 
 
 def dollars(prompt_tokens: int, replies: int) -> float:

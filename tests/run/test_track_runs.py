@@ -376,7 +376,7 @@ def test_runs_in_two_engines_are_scored_anywhere_and_never_compared(inside, monk
         names.append(described_engine())
         call("run", "steps", "--out", out, *suite)
         manifest = yaml.safe_load((out / "run.yaml").read_bytes())
-        (record,) = map(json.loads, (out / "records.jsonl").read_text().splitlines())
+        (record,) = workspace.records(out)
         assert record["engine"] == manifest["engine"]
         endings[manifest["engine"]] = record["ending"]
     assert endings == dict.fromkeys(names, "collapsed")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 import random
 from collections.abc import Iterator
@@ -20,6 +19,7 @@ from phyblock.results.paper import published_table
 from phyblock.scoring.plan import AssemblyScorer, Counts, Goal, chance, match_plan
 from phyblock.types import MATCHERS, SETTINGS, PlanParser
 from tests.shipped import DATA, official_tasks, reply_texts
+from tests.workspace import csv_rows
 
 Row = tuple[str, str, str, str]
 
@@ -46,13 +46,12 @@ def scored(
 
 def test_known_counts_match_row_for_row(official_dir, official_checkout, tasks):
     path = official_dir / "expected" / "assembly_counts.csv"
-    with path.open(encoding="utf-8", newline="") as file:
-        expected = {
-            (row["model"], row["scene"], row["setting"], row["criterion"]): tuple(
-                int(row[column]) for column in ("level", "tp", "fp", "fn")
-            )
-            for row in csv.DictReader(file)
-        }
+    expected = {
+        (row["model"], row["scene"], row["setting"], row["criterion"]): tuple(
+            int(row[column]) for column in ("level", "tp", "fp", "fn")
+        )
+        for row in csv_rows(path)
+    }
     models = {model for model, *_ in expected}
     found = dict(scored(official_checkout, tasks))
     assert {row: counts for row, counts in found.items() if row[0] in models} == expected

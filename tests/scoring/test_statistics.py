@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections import defaultdict
 from pathlib import Path
 
@@ -31,6 +30,7 @@ from phyblock.scoring.statistics import (
 )
 from tests.scoring.cases import World, precision_of, recall_of
 from tests.shipped import official_tasks
+from tests.workspace import csv_rows
 
 NAMES = st.lists(st.sampled_from("abcdefg"), min_size=1, max_size=3)
 MEMBERS = st.lists(NAMES, min_size=2, max_size=12)
@@ -256,11 +256,10 @@ def official(official_dir: Path) -> tuple[dict[str, Floats], Clusters, Clusters]
     scenes = [task.scene for task in official_tasks(official_dir / "PhyBlock")]
     place = {scene.id: n for n, scene in enumerate(scenes)}
     counts: dict[str, Floats] = defaultdict(lambda: np.zeros((len(scenes), 3)))
-    with (official_dir / "expected" / "assembly_counts.csv").open(newline="") as file:
-        for row in csv.DictReader(file):
-            if (row["setting"], row["criterion"]) == ("A", "aov"):
-                numbers = [int(row[name]) for name in ("tp", "fp", "fn")]
-                counts[row["model"]][place[row["scene"]]] = numbers
+    for row in csv_rows(official_dir / "expected" / "assembly_counts.csv"):
+        if (row["setting"], row["criterion"]) == ("A", "aov"):
+            numbers = [int(row[name]) for name in ("tp", "fp", "fn")]
+            counts[row["model"]][place[row["scene"]]] = numbers
     return counts, Clusters.of([s.parents for s in scenes]), alone(len(scenes))
 
 

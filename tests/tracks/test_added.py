@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 import re
@@ -30,7 +29,7 @@ from phyblock.tracks.base import Judgement, SceneTrack, kind_of
 from phyblock.tracks.full_planning import FullPlanning
 from phyblock.tracks.measures import LayoutColumn, Measure, SampleCounts, TrackReport
 from phyblock.web.board import SiteRun, Sources, board_of, entries_of, values_of
-from tests.workspace import Workspace, call, write_questions
+from tests.workspace import Workspace, call, csv_rows, write_lines, write_questions
 
 
 def needless_steps(task: Any, record: Any) -> tuple[float, float]:
@@ -73,30 +72,30 @@ def test_scoring_again_fills_in_what_older_records_lack(here, request):
     assert not call("run", "suite.yaml", "--out", here.out, "--no-report")
     stored = here.records()
     assert not any("needless_steps" in record["counts"] for record in stored)
-    for line in stored:
-        bare = [{k: v for k, v in one.items() if k not in LATER} for one in line["scores"]]
-        append = "w" if line is stored[0] else "a"
-        with (here.out / "records.jsonl").open(append, encoding="utf-8") as file:
-            file.write(json.dumps({**line, "scores": bare}) + "\n")
+    bare = [
+        [{k: v for k, v in one.items() if k not in LATER} for one in line["scores"]]
+        for line in stored
+    ]
+    lines = ({**line, "scores": scores} for line, scores in zip(stored, bare, strict=True))
+    write_lines(here.out / "records.jsonl", lines)
     request.getfixturevalue("added")
     write_tables(here.out)
-    with (here.out / "tables" / "estimates.csv").open(newline="") as file:
-        known = {row["measure"] for row in csv.DictReader(file)}
+    known = {row["measure"] for row in here.rows("estimates")}
     assert known.isdisjoint({"needless", "distance", "blocks_order"})
     assert {"success", "macro_f1"} <= known
     scored = Path(shutil.copytree(here.out, here.root / "scored"))
     call("score", scored)
     write_tables(scored)
-    with (scored / "tables" / "estimates.csv").open(newline="") as file:
-        rows = [row for row in csv.DictReader(file) if row["measure"] == "needless"]
+    estimates = csv_rows(scored / "tables" / "estimates.csv")
+    rows = [row for row in estimates if row["measure"] == "needless"]
     assert {row["cell"] for row in rows} == {"1", "2", "3", "4", "overall"}
     whole = {row["model"]: row for row in rows if row["cell"] == "overall"}
     assert float(whole["oracle"]["value"]) == float(whole["oracle"]["lo"]) == 0
     row = whole["all-candidates"]
     assert 0.5 < float(row["lo"]) <= float(row["value"]) <= float(row["hi"]) < 1
     call("compare", scored, "--measure", "needless", "--out", scored / "compared")
-    with (scored / "compared" / "comparison.csv").open(newline="") as file:
-        compared = {row["part"]: row for row in csv.DictReader(file)}["overall"]
+    parts = csv_rows(scored / "compared" / "comparison.csv")
+    (compared,) = (row for row in parts if row["part"] == "overall")
     assert float(compared["value_b"]) == pytest.approx(100 * float(row["value"]), abs=1e-3)
     assert float(compared["lo"]) < float(compared["difference"]) < float(compared["hi"])
     assert (compared["better"], compared["worse"]) == ("5", "0")
@@ -227,10 +226,9 @@ def test_an_episode_that_would_have_asked_otherwise_is_no_longer_final(here, req
     counted = SampleCounts("first_steps", ("placed", "n"), sample=first_is_placed)
     registry.add_measure("step_planning", Measure("first", "First", counted, ratio_of))
     request.addfinalizer(lambda: registry.remove_measure("step_planning", "first"))
-    path = here.out / "records.jsonl"
     lines = here.records()
     lines[0]["turns"][0]["reply"]["text"] = "Done"
-    path.write_text("".join(json.dumps(line) + "\n" for line in lines), encoding="utf-8")
+    write_lines(here.out / "records.jsonl", lines)
     told: list[str] = []
     rescore(here.out, report=told.append)
     first, *others = here.records()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import itertools
 from collections import Counter
 from collections.abc import Sequence
@@ -33,7 +32,7 @@ from phyblock.tracks.questions import (
     select_questions,
 )
 from tests.tracks.conftest import track_of
-from tests.workspace import Workspace, write_questions
+from tests.workspace import Workspace, in_a_loop, write_questions
 
 STYLE = PictureStyle(size_px=128)
 LEVELS = (1, 2, 3, 4)
@@ -59,13 +58,11 @@ def of_tasks(found: QuestionSet, tasks: Sequence[QuestionTask]) -> QuestionSet:
     return QuestionSet("some", found.root, tuple(tasks))
 
 
-def ask(track: Vqa, *keys: str, seed: int = 0) -> list[Request]:
-    async def all_of_them() -> list[Request]:
-        items = [item for item in track.items if not keys or item.key in keys]
-        shown = [track.shown(item, seed) for item in items]
-        return [await track.request(item, seed, {}, with_messages=True) for item in shown]
-
-    return asyncio.run(all_of_them())
+@in_a_loop
+async def ask(track: Vqa, *keys: str, seed: int = 0) -> list[Request]:
+    items = [item for item in track.items if not keys or item.key in keys]
+    shown = [track.shown(item, seed) for item in items]
+    return [await track.request(item, seed, {}, with_messages=True) for item in shown]
 
 
 def user_parts(request: Request) -> tuple[str | Image, ...]:

@@ -15,7 +15,7 @@ import pytest
 
 from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat
-from tests.workspace import Workspace, questions, write_questions
+from tests.workspace import Workspace, questions, read_lines, write_lines, write_questions
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, BrowserContext, Locator, LocatorAssertions, Page
@@ -142,7 +142,7 @@ def made(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Worksp
     done = made.run()
     assert done.code == 0, done.err
     path = made.out / "records.jsonl"
-    lines = [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+    lines = read_lines(path)
     for record in lines:
         if record["sample"] == "full_planning/random/t3/s0":
             record["reply"]["text"] = record["reply"]["reasoning"] = HOSTILE
@@ -155,7 +155,7 @@ def made(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Worksp
                     score["placed"], score["why"] = [None, 0], ["shape_not_in_gt", None]
         if record["sample"] == "full_planning/random/t4/s0":
             record.update(reply=None, outcome="missing", scores=[], parse=None)
-    path.write_text("".join(json.dumps(record) + "\n" for record in lines), encoding="utf-8")
+    write_lines(path, lines)
     done = made.phyblock("report", made.out)
     assert done.code == 0, done.err
     return made
@@ -208,17 +208,15 @@ def site(runs: Workspace) -> Path:
     manifest = (source / "run.yaml").read_text(encoding="utf-8")
     renamed = manifest.replace("name: random", f'name: "{json.dumps(NAME)[1:-1]}"')
     (folder / "run.yaml").write_text(renamed, encoding="utf-8")
-    lines = []
-    for line in (source / "records.jsonl").read_text(encoding="utf-8").splitlines():
-        record = json.loads(line)
+    lines = read_lines(source / "records.jsonl")
+    for record in lines:
         hostile = {"random": NAME, "t3": NAME}
         for field in ("model", "key", "scene"):
             record[field] = hostile.get(record[field], record[field])
         record["sample"] = f"{record['track']}/{record['model']}/{record['key']}/s{record['seed']}"
         if record["model"] == NAME:
             record["reply"]["text"] = record["reply"]["reasoning"] = HOSTILE
-        lines.append(json.dumps(record) + "\n")
-    (folder / "records.jsonl").write_text("".join(lines), encoding="utf-8")
+    write_lines(folder / "records.jsonl", lines)
     data = ("--data", "data", "--data", "questions")
     named = ("--title", f"A site {NAME}", "--out", "site")
     done = runs.phyblock("site", "hostile", "later.zip", *data, *named)

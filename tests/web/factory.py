@@ -12,6 +12,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 
 from phyblock.records.files import Manifest, known_records
+from phyblock.records.record import Reply
 from phyblock.results.load import Run, design_of, frames_of
 from phyblock.scoring.plan import BLOCK_OUTCOMES, ERROR_TYPES
 from phyblock.types import OUTCOMES
@@ -62,19 +63,12 @@ def score(
     setting: str = "A",
     errors: tuple[int, int, int, int] | None = None,
 ) -> dict[str, Any]:
-    counts = errors or (fp, 0, 0, 0)
+    counted = {"criterion": criterion, "setting": setting, "tp": tp, "fp": fp, "fn": fn}
+    if criterion != "aov":
+        return {**counted, "matcher": None, "errors": None, "blocks": None, "kept": None}
+    by_type = dict(zip(ERROR_TYPES, errors or (fp, 0, 0, 0), strict=True))
     blocks = {**dict.fromkeys(BLOCK_OUTCOMES, 0), "placed": tp, "left_out": fn}
-    return {
-        "criterion": criterion,
-        "matcher": matcher if criterion == "aov" else None,
-        "setting": setting,
-        "tp": tp,
-        "fp": fp,
-        "fn": fn,
-        "errors": dict(zip(ERROR_TYPES, counts, strict=True)) if criterion == "aov" else None,
-        "blocks": blocks if criterion == "aov" else None,
-        "kept": tp if criterion == "aov" else None,
-    }
+    return {**counted, "matcher": matcher, "errors": by_type, "blocks": blocks, "kept": tp}
 
 
 def record(
@@ -87,6 +81,8 @@ def record(
 ) -> dict[str, Any]:
     answered = outcome not in ("api_error", "missing")
     usage = {name: reply.pop(name, None) for name in ("prompt_tokens", "completion_tokens")}
+    told = {"text": "Move block with index 1", "latency_s": 0.5, "usage": usage, **reply}
+    busy = {"kind": "retryable", "status": 429, "message": "busy"}
     return {
         "sample": f"full_planning/{model}/{scene}/s{seed}",
         "track": "full_planning",
@@ -98,24 +94,8 @@ def record(
         "n_blocks": 4,
         "seed": seed,
         "outcome": outcome,
-        "reply": {
-            "text": "Move block with index 1",
-            "reasoning": "",
-            "finish": "stop",
-            "usage": {**usage, "reasoning_tokens": None},
-            "cost_usd": None,
-            "latency_s": 0.5,
-            "provider_model": "",
-            "attempts": 1,
-            "cached": False,
-            "seed_sent": True,
-            **reply,
-        }
-        if answered
-        else None,
-        "error": {"kind": "retryable", "status": 429, "message": "busy"}
-        if outcome == "api_error"
-        else None,
+        "reply": Reply.model_validate(told).model_dump() if answered else None,
+        "error": busy if outcome == "api_error" else None,
         "prompt": None,
         "parse": {"parser": "steps", "rule": "last_step_list", "plan": [1], "dropped": [99]},
         "scores": [dict(one) for one in scores],

@@ -24,7 +24,7 @@ from phyblock.run.runner import RunResult
 from phyblock.tracks.picking import Choice, Pick, Picking
 from phyblock.web.server import LARGEST_BODY_BYTES, Server
 from phyblock.web.session import NotNowError, Person, PlaySession, plan_session
-from tests.workspace import SCENES, Workspace
+from tests.workspace import SCENES, Workspace, in_a_loop, read_lines
 
 PICTURE = Image(b"pixels", "candidates", 64, 64)
 PICKING = Picking(
@@ -56,25 +56,23 @@ async def asked(clock: Clock) -> tuple[PlaySession, asyncio.Task[tuple[str, floa
     return session, task
 
 
-def test_nothing_is_shown_before_the_beginning_and_no_name_or_answer_ever():
-    async def play() -> None:
-        session, task = await asked(Clock())
-        told = session.state(-1)
-        assert told["phase"] == "start"
-        assert "question" not in told
-        assert session.picture(told["change"], 0) is None
-        session.begin()
-        told = session.state(-1)
-        parts = told["question"]["messages"][0]["parts"]
-        assert [part.get("text") for part in parts] == ["Look:", None, "What comes first?"]
-        assert "secret" not in json.dumps(told)
-        assert session.picture(told["change"], 0) is PICTURE
-        assert session.picture(told["change"], 1) is session.picture(told["change"] - 1, 0) is None
-        session.close()
-        with pytest.raises(HaltedError):
-            await task
-
-    asyncio.run(play())
+@in_a_loop
+async def test_nothing_is_shown_before_the_beginning_and_no_name_or_answer_ever():
+    session, task = await asked(Clock())
+    told = session.state(-1)
+    assert told["phase"] == "start"
+    assert "question" not in told
+    assert session.picture(told["change"], 0) is None
+    session.begin()
+    told = session.state(-1)
+    parts = told["question"]["messages"][0]["parts"]
+    assert [part.get("text") for part in parts] == ["Look:", None, "What comes first?"]
+    assert "secret" not in json.dumps(told)
+    assert session.picture(told["change"], 0) is PICTURE
+    assert session.picture(told["change"], 1) is session.picture(told["change"] - 1, 0) is None
+    session.close()
+    with pytest.raises(HaltedError):
+        await task
 
 
 def test_the_clock_runs_from_the_first_look_and_stands_still_in_pauses():
@@ -98,23 +96,21 @@ def test_the_clock_runs_from_the_first_look_and_stands_still_in_pauses():
     assert asyncio.run(play()) == ("1 0 1", 5.5)
 
 
-def test_an_answer_counts_once_and_only_for_what_lies_there():
-    async def play() -> None:
-        session, task = await asked(Clock())
-        session.begin()
-        change = session.state(-1)["change"]
+@in_a_loop
+async def test_an_answer_counts_once_and_only_for_what_lies_there():
+    session, task = await asked(Clock())
+    session.begin()
+    change = session.state(-1)["change"]
+    with pytest.raises(NotNowError):
+        session.answer(change - 1, [Pick(0)])
+    with pytest.raises(ValueError, match="needs 1 to"):
+        session.answer(change, [])
+    session.answer(change, [Pick(0)])
+    for late in (change, change + 1):
         with pytest.raises(NotNowError):
-            session.answer(change - 1, [Pick(0)])
-        with pytest.raises(ValueError, match="needs 1 to"):
-            session.answer(change, [])
-        session.answer(change, [Pick(0)])
-        for late in (change, change + 1):
-            with pytest.raises(NotNowError):
-                session.answer(late, [Pick(1)])
-        assert (await task)[0] == "0"
-        assert session.state(-1)["phase"] == "waiting"
-
-    asyncio.run(play())
+            session.answer(late, [Pick(1)])
+    assert (await task)[0] == "0"
+    assert session.state(-1)["phase"] == "waiting"
 
 
 def played(suite: Path, picks: Sequence[int]) -> tuple[RunResult, list[str]]:
@@ -156,7 +152,7 @@ def test_an_episode_goes_on_where_the_sitting_was_closed(tmp_path, pictures_dir,
     result, shown = played(suite, [blue])
     assert (result.settled, result.left) == (1, 0)
     assert "This is step 3 of" in shown[0]
-    (record,) = map(json.loads, (tmp_path / "out" / "records.jsonl").read_text().splitlines())
+    (record,) = read_lines(tmp_path / "out" / "records.jsonl")
     assert record["outcomes"] == ["dependency_not_met", "placed", "placed"]
     moves = ["Next plan: Move(3)", "Next plan: Move(1)", "Next plan: Move(3)"]
     assert [turn["reply"]["text"] for turn in record["turns"]] == moves
@@ -172,8 +168,8 @@ def test_a_warm_up_on_another_scene_of_level_1_is_shown_how_it_went_and_not_kept
     _, (warm_up, went, question) = played(suite, [0, 2])
     assert ['"number": 0' in warm_up, '"number": 1' in question] == [True, True]
     assert [step["name"] for step in json.loads(went)["steps"]] == ["1"]
-    lines = (tmp_path / "out" / "records.jsonl").read_text().splitlines()
-    records = {one["model"]: one for one in map(json.loads, lines)}
+    lines = read_lines(tmp_path / "out" / "records.jsonl")
+    records = {one["model"]: one for one in lines}
     # Rules that never see the goal stand beside the person.
     assert records.keys() == {"human:ada", "goal-blind", "random"}
     assert len(lines) == len(records)

@@ -5,7 +5,6 @@ What is answered here is a script's, to test the page: it says nothing of what p
 
 from __future__ import annotations
 
-import json
 import re
 import time
 from collections.abc import Iterator
@@ -18,7 +17,7 @@ import pytest
 
 from tests.fork_server import Forked, fork_server
 from tests.web.conftest import Visit
-from tests.workspace import SCENES, Raw, Workspace, questions, write_questions
+from tests.workspace import SCENES, Raw, Workspace, questions, read_lines, write_questions
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
@@ -111,10 +110,8 @@ def task(page: Page, number: int) -> None:
 
 def answered(folder: Path) -> list[Raw]:
     path = folder / "records.jsonl"
-    if not path.exists():
-        return []
-    lines = path.read_text(encoding="utf-8").splitlines()
-    return [one for one in map(json.loads, lines) if one["model"] == "human:ada"]
+    lines = read_lines(path) if path.exists() else []
+    return [one for one in lines if one["model"] == "human:ada"]
 
 
 def said(record: Raw) -> str:
@@ -302,8 +299,7 @@ def sent_to(page: Page) -> list[object]:
 
 
 def stored_prompt(run: Path, record: Raw) -> list[object]:
-    lines = (run / "prompts.jsonl").read_text(encoding="utf-8").splitlines()
-    prompts = {line["sha256"]: line for line in map(json.loads, lines)}
+    prompts = {line["sha256"]: line for line in read_lines(run / "prompts.jsonl")}
     messages = prompts[record["prompt"]["messages"]]["messages"]
     parts = [part for message in messages for part in message["parts"]]
     texts = [part for part in parts if isinstance(part, str)]
