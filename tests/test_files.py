@@ -15,7 +15,7 @@ import zlib
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image, PngImagePlugin
 
@@ -218,7 +218,6 @@ def test_a_bad_picture_is_refused(data, told, tmp_path):
     assert problem.allowed
 
 
-@settings(deadline=None)
 @given(PICTURES)
 def test_any_bytes_are_a_picture_or_a_data_error(data):
     with contextlib.suppress(DataError):

@@ -12,7 +12,8 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Coroutine, Iterable, Mapping, Sequence
+from collections.abc import Callable, Coroutine, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -24,6 +25,7 @@ from phyblock.domain.question import CATEGORIES, LETTERS, SUBTASKS
 from tests.fork_server import ONE_THREAD, Done, Forked, fork_server
 
 Raw = dict[str, Any]
+S = TypeVar("S")
 T = TypeVar("T")
 
 SHARED = ("pictures", "goal-blind")
@@ -227,6 +229,27 @@ class Workspace:
         """
         less = () if page else ("--no-report",)
         return self.phyblock("run", "suite.yaml", "--out", self.out, *less, *args, **options)
+
+    def completed(self, *args: str | Path, **options: Any) -> Done:
+        """Run, without an error."""
+        done = self.run(*args, **options)
+        assert (done.code, done.err) == (0, ""), done.out + done.err
+        return done
+
+    @contextmanager
+    def served(
+        self, server: S, *names: str, entry: Mapping[str, Any] | None = None, **suite: Any
+    ) -> Iterator[S]:
+        """A server of models of these names, `alpha` alone by default, and a suite that asks them;
+        `entry` has more fields of their entries.
+        """
+        from tests.servers.chassis import Running
+
+        names = names or ("alpha",)
+        with Running(server) as running:
+            self.write_models(running.url, *names, **(entry or {}))
+            self.write_suite(models=list(names), **suite)
+            yield server
 
     def copied(self, root: Path) -> Workspace:
         """A copy of all of it in another folder; pictures stay shared."""

@@ -210,9 +210,7 @@ def test_a_film_tells_the_outcome_of_each_step_and_the_end(played):
 
 
 def test_a_plan_is_shown_from_its_prompt_to_its_verdicts(workspace):
-    with Running(OpenAIChat()) as running:
-        workspace.write_models(running.url, "alpha")
-        workspace.write_suite(models=["alpha"])
+    with workspace.served(OpenAIChat()):
         assert workspace.run().code == 0
     shown = next(one for one in workspace.records() if one["scene"] == "t3")
     done = workspace.phyblock("show", "out", "alpha/t3", env={"COLUMNS": "80"})

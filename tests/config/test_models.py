@@ -93,7 +93,7 @@ def test_a_dumped_file_loads_equal(tmp_path_factory, options):
     assert load(folder, json.dumps(dumped)) == models
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(data=MODELS_FILES)
 def test_any_models_file_is_read_or_refused(data, tmp_path_factory):
     path = tmp_path_factory.getbasetemp() / "law-models.yaml"

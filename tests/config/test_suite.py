@@ -185,7 +185,7 @@ def test_a_variant_is_the_suite_with_other_values_in_its_fields(folder):
     assert plain.at(Variant()) == plain
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(data=SUITES, override=st.none() | OVERRIDES)
 def test_any_suite_is_read_or_refused(folder, data, override):
     (folder / "law.yaml").write_bytes(data)

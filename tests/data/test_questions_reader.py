@@ -235,7 +235,7 @@ def test_a_whole_character_in_two_escapes_is_fine(tmp_path, scenes):
     assert read_one(tmp_path / "q", scenes, QUESTION | {"question": text}).question.text == text
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(QUESTIONS)
 def test_any_question_is_read_or_refused(tmp_path_factory, line):
     folder = tmp_path_factory.getbasetemp()

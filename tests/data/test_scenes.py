@@ -273,7 +273,6 @@ def tasks(draw: st.DrawFn) -> AssemblyTask:
     return AssemblyTask(Scene(draw(NAMES), levels, file_order, parents), candidates)
 
 
-@settings(deadline=None)
 @given(written=st.lists(tasks(), min_size=1, max_size=3, unique_by=lambda task: task.scene.id))
 def test_any_valid_scene_reads_back_equal(tmp_path_factory, written):
     folder = tmp_path_factory.getbasetemp()
@@ -283,7 +282,7 @@ def test_any_valid_scene_reads_back_equal(tmp_path_factory, written):
     assert read.tasks == tuple(sorted(written, key=lambda task: task.scene.id))
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(SCENES)
 def test_any_scene_is_read_or_refused(tmp_path_factory, line):
     folder = tmp_path_factory.getbasetemp()
@@ -293,7 +292,7 @@ def test_any_scene_is_read_or_refused(tmp_path_factory, line):
             assert max(map(abs, (x for b in task.scene.blocks for x in b.position_m))) <= 100
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(CANDIDATES)
 def test_any_candidate_set_is_read_or_refused(tmp_path_factory, data):
     path = tmp_path_factory.getbasetemp() / "c.json"

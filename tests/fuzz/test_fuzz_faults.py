@@ -264,10 +264,9 @@ class Moody(OpenAIChat):
 def test_no_more_is_spent_than_the_limit_and_what_was_under_way(workspace, tallies, number):
     draw = random.Random(f"{SEED} costs {number}")
     limit = 10 ** draw.uniform(-1, 2)
-    with Running(Moody(draw)) as running:
-        server = running.server
-        workspace.write_models(running.url, "alpha", price=PRICE, max_tokens=999)
-        workspace.write_suite(models=["alpha"], seeds=list(range(8)))
+    with workspace.served(
+        Moody(draw), entry={"price": PRICE, "max_tokens": 999}, seeds=list(range(8))
+    ) as server:
         done = workspace.run("--set", f"limits.max_cost_usd={limit}")
         assert done.code in (0, 1), done.err
     ended: dict[int, float] = {}

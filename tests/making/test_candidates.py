@@ -6,7 +6,7 @@ from dataclasses import replace
 from itertools import islice
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.domain.blocks import KIT_PALETTE
@@ -58,7 +58,6 @@ def fresh(count: int, seed: int) -> Tasks:
 
 
 @given(scenes, st.integers(0, 9))
-@settings(deadline=None)
 def test_all_that_is_needed_is_there_and_no_look_twice(scene, seed):
     candidates = make_candidates(scene, seed)
     assert candidates.missing(scene) == ()
@@ -67,7 +66,6 @@ def test_all_that_is_needed_is_there_and_no_look_twice(scene, seed):
 
 
 @given(scenes)
-@settings(deadline=None)
 def test_distractors_are_of_the_palette_in_poses_that_goals_need(scene):
     needed = {block.look for block in scene.blocks}
     known = {

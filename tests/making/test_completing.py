@@ -53,7 +53,7 @@ def same(scene: Scene) -> bool:
 
 
 @given(st.sampled_from(TASKS))
-@settings(max_examples=5, deadline=None)
+@settings(max_examples=5)
 def test_a_scene_that_is_stripped_comes_back(task):
     assert same(task.scene)
 
@@ -64,7 +64,7 @@ def test_all_scenes_that_are_stripped_come_back():
 
 
 @given(order=st.permutations(range(5)))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_blocks_may_be_listed_in_any_order(order):
     scene = derived("gables", of(*(GABLES[i] for i in order)), "here")
     assert [block.order for block in scene.blocks] == [1, 2, 3, 4, 5]

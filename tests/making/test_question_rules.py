@@ -77,7 +77,6 @@ def shown(*blocks: Block, azimuth: float = 45.0) -> QuestionPicture:
 # Names of blocks
 
 
-@settings(deadline=None)
 @given(
     st.sampled_from(SCENES[::10]), st.sets(st.sampled_from(FEATURES), min_size=1), st.floats(0, 360)
 )
@@ -127,7 +126,7 @@ def test_a_turn_is_the_one_that_was_made(kind, data):
     assert {name for one in turned for name in axis_turns(one, lying)} == set(AXIS_TURNS)
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(scenes, seeds)
 def test_a_loose_block_stands_free_on_the_ground(scene, seed):
     loose = put_beside(scene.blocks[0], scene.blocks, np.random.default_rng(seed))
@@ -137,7 +136,7 @@ def test_a_loose_block_stands_free_on_the_ground(scene, seed):
     assert len({one.order for one in every}) == len(every)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(scenes)
 def test_layers_are_one_more_than_what_is_below(scene):
     try:
@@ -149,7 +148,7 @@ def test_layers_are_one_more_than_what_is_below(scene):
         assert layer == 1 + max(layers.get(other, 0) for other in below[order])
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(scenes, st.sampled_from(SYMMETRIES), st.sampled_from(sorted(LENGTHS)))
 def test_lengths_stay_what_they_are_in_a_mirror_and_after_a_turn(scene, symmetry, rule):
     other = transformed(scene.blocks, symmetry)

@@ -50,7 +50,7 @@ steps = st.lists(
 
 
 @given(steps)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_whatever_is_put_down_neither_overlaps_nor_floats(drawn):
     sketch = Draft(np.random.default_rng(0))
     for block_type, y, x, pose in drawn:
@@ -74,7 +74,7 @@ def some(group: str, count: int, palette: str = "kit") -> tuple[Request, ...]:
 
 @given(requests)
 @example(Request(13, "full", "3", 15))
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 def test_what_the_grammar_draws_keeps_its_limits(request_):
     scene = draw(request_)
     if scene is not None:
@@ -135,7 +135,7 @@ def test_a_combined_scene_holds_both_parents():
 
 
 @given(st.integers(0, 3), st.integers(0, 3), st.sampled_from([0.0, 1.0, 2.5]), st.booleans())
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 def test_parts_stand_beside_one_another_with_their_gap(one, other, gap, deep):
     axis = 0 if deep else 1
     parts = [draw(request).blocks for request in (some("2", 4)[one], some("2", 4)[other])]
@@ -251,7 +251,6 @@ def apart_m(first: np.ndarray, second: np.ndarray) -> float:
 
 
 @given(poses, st.sampled_from(SYMMETRIES))
-@settings(deadline=None)
 def test_the_image_of_a_block_fills_the_image_of_its_space(pose, symmetry):
     block = block_at(*pose)
     (image,) = transformed([block], symmetry)
@@ -268,7 +267,6 @@ def test_known_poses_map_to_known_poses_one_to_one(symmetry):
 
 
 @given(structures, st.sampled_from(SYMMETRIES), st.tuples(angles, angles), st.randoms())
-@settings(deadline=None)
 def test_the_form_is_kept_by_turning_mirroring_shifting_and_order(blocks, symmetry, shift, random):
     step_m = 0.001
     moved = [
@@ -281,7 +279,6 @@ def test_the_form_is_kept_by_turning_mirroring_shifting_and_order(blocks, symmet
 
 
 @given(structures, st.integers(0, 50))
-@settings(deadline=None)
 def test_another_color_or_place_is_another_form(blocks, pick):
     block = blocks[pick % len(blocks)]
     other = replace(block, color="red" if block.color != "red" else "blue")
@@ -293,7 +290,7 @@ def test_another_color_or_place_is_another_form(blocks, pick):
 
 
 @given(structures, st.sampled_from(SYMMETRIES))
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 def test_contacts_are_kept(blocks, symmetry):
     image = transformed(blocks, symmetry)
     assert support_graph(image) == support_graph(blocks)

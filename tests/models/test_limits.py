@@ -7,7 +7,7 @@ import heapq
 import itertools
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.errors import (
@@ -75,7 +75,6 @@ calls = st.lists(
 )
 
 
-@settings(max_examples=100, deadline=None)
 @given(calls, st.integers(1, 10), st.integers(100, 500), st.integers(1, 8))
 @in_a_loop
 async def test_no_window_of_a_minute_has_more_starts_or_tokens_than_allowed(
@@ -148,7 +147,6 @@ async def test_a_model_waiting_for_its_minute_holds_no_place_that_another_could_
     assert finished_s < WINDOW_S
 
 
-@settings(max_examples=100, deadline=None)
 @given(st.lists(st.tuples(st.integers(0, 5), st.booleans()), max_size=30), st.integers(1, 4))
 @in_a_loop
 async def test_limits_survive_those_that_give_up(plans, width):

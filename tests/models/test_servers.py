@@ -103,7 +103,7 @@ def ask_through(
     return answers, told
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     st.floats(0, 30, allow_nan=False),
     st.floats(1, 280, allow_nan=False),
@@ -135,7 +135,7 @@ def test_a_wrong_address_stops_the_model_after_few_attempts_and_leaves_its_sampl
     assert 100 <= time.now_s < 220
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.floats(30, 60, allow_nan=False), st.integers(2, 12))
 def test_a_server_that_has_answered_is_tried_for_as_long_as_the_policy_says(begins_s, width):
     time = FakeTime()
@@ -157,7 +157,7 @@ def break_off(servers: Servers, server: Server, error: ModelError = REFUSED) -> 
         servers.failed(server, error, number, servers._policy.clock.now())
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     st.integers(1, 6),
     st.lists(st.tuples(st.booleans(), st.integers(0, 50)), max_size=60),

@@ -314,7 +314,7 @@ def test_a_text_of_one_piece_is_read_in_linear_time(name):
 
 
 @pytest.mark.parametrize("name", READERS)
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(st.lists(st.sampled_from(PIECES), min_size=2, max_size=8).map("".join))
 @example("Step1: Move block with index 16  \n")
 def test_a_text_of_many_pieces_is_read_in_linear_time(name, piece):

@@ -42,8 +42,7 @@ def test_all_tracks_of_one_turn_go_out_in_batches_at_half_the_price(workspace):
             costs += re.findall(r"4 calls, about \$([\d.]+) ", dry.out)
         batched, single = map(float, costs)
         assert batched == pytest.approx(single / 2, abs=0.006)  # cents are shown
-        done = workspace.run("--yes")
-        assert (done.code, done.err) == (0, "")
+        done = workspace.completed("--yes")
         assert "waiting for batch batch-0 since" in done.out
         server = running.server
         records = workspace.records()
@@ -114,8 +113,7 @@ def test_kills_of_the_process_lose_nothing_and_ask_nothing_twice(workspace):
 
 
 def finished(workspace: Workspace, server: BatchServer, samples: int) -> None:
-    done = workspace.run("--yes")
-    assert (done.code, done.err) == (0, "")
+    workspace.completed("--yes")
     records = workspace.records()
     assert len(records) == samples
     assert {record["outcome"] for record in records} == {"ok"}

@@ -63,8 +63,7 @@ def test_a_model_that_looks_is_right_in_every_order(workspace):
     )
     with Running(sighted(answers)) as running:
         workspace.write_models(running.url, "alpha", "beta", transport="direct")
-        done = workspace.run()
-        assert (done.code, done.err) == (0, "")
+        done = workspace.completed()
         assert running.server.requests == 20
     check_records(workspace.records(), tasks)
     assert "[candidates shuffled]" in done.out
@@ -97,15 +96,16 @@ def check_scored_again(workspace: Workspace) -> None:
 
 def test_blind_leaves_out_the_goal_and_leaves_the_candidates(workspace):
     grid = digest(candidates_png(tasks_of(workspace)["t1"].candidates, STYLE))
-    with Running(sighted({(grid,): "Step1: Move block with index 1"})) as running:
-        workspace.write_models(running.url, "alpha", transport="direct")
-        workspace.write_suite(
-            models=["alpha"], images=APART, levels=[2, 3], full_planning={"blind": True}
-        )
-        done = workspace.run()
-        assert (done.code, done.err) == (0, "")
-        texts = {str(seen.parts[-1]) for seen in running.server.seen}
-        sent = [seen.pictures for seen in running.server.seen]
+    with workspace.served(
+        sighted({(grid,): "Step1: Move block with index 1"}),
+        entry={"transport": "direct"},
+        images=APART,
+        levels=[2, 3],
+        full_planning={"blind": True},
+    ) as server:
+        done = workspace.completed()
+        texts = {str(seen.parts[-1]) for seen in server.seen}
+        sent = [seen.pictures for seen in server.seen]
     assert "[blind]" in " ".join(done.out.split())
     shown = {"order": list(range(1, 17)), "blind": True}
     assert all(record["shown"] == shown for record in workspace.records())
@@ -124,8 +124,7 @@ def test_episodes_are_shuffled_and_blind_as_well(workspace):
         candidates={"order": "shuffled"},
         steps={"physics": "off", "blind": True},
     )
-    done = workspace.run()
-    assert (done.code, done.err) == (0, "")
+    done = workspace.completed()
     assert "candidates shuffled, blind]" in " ".join(done.out.split())
     f1 = overall_f1(workspace)
     assert f1["oracle"] == 1.0 > f1["all-candidates"]
@@ -155,8 +154,7 @@ def test_blind_baselines_are_scored_beside_models_without_being_named(workspace)
     suite = yaml.safe_load((workspace.root / "suite.yaml").read_text())
     del suite["baselines"]
     workspace.write_yaml("suite.yaml", suite)
-    done = workspace.run()
-    assert (done.code, done.err) == (0, "")
+    done = workspace.completed()
     assert [record["model"] for record in workspace.records()] == ["again", *blind]
     assert "0 of 1 model is above goal-blind" in done.out
     # A run of baselines alone has those that it names.
@@ -200,8 +198,7 @@ def test_every_way_is_asked_once_and_the_reference_is_what_a_plain_suite_asks(wo
         dry = workspace.run("--dry-run")
         assert "16 conditions" in dry.out
         assert f"{WAYS * SCENES} calls" in dry.out
-        done = workspace.run()
-        assert (done.code, done.err) == (0, "")
+        workspace.completed()
         # A repeat is no question that the cache knows.
         assert len({seen.sample for seen in server.seen}) == server.requests == WAYS * SCENES
         check_repeats(workspace.records(), server)
@@ -238,8 +235,7 @@ def test_questions_and_episodes_vary_what_they_know(workspace):
     workspace.write_suite(
         tracks=["step_planning"], levels=[4], vary={"view": ["oblique", "top"], "repeats": 2}
     )
-    done = workspace.run()
-    assert (done.code, done.err) == (0, "")
+    workspace.completed()
     records = workspace.records()
     assert len(records) == 2 * 4
     oracle = [r for r in records if r["model"] == "oracle"]

@@ -47,10 +47,9 @@ def spent(workspace: Workspace) -> float:
 
 
 def test_the_limit_is_not_passed_and_a_higher_one_goes_on(workspace):
-    with Running(OpenAIChat()) as running:
-        server = running.server
-        workspace.write_models(running.url, "alpha", price=PRICE, max_tokens=100)
-        workspace.write_suite(models=["alpha"], seeds=list(range(12)))
+    with workspace.served(
+        OpenAIChat(), entry={"price": PRICE, "max_tokens": 100}, seeds=list(range(12))
+    ) as server:
         first = workspace.run("--set", f"limits.max_cost_usd={MOST_USD}")
         assert (first.code, first.err) == (1, "")
         assert f"of ${MOST_USD} spent; the next call can cost $" in first.out
@@ -65,8 +64,7 @@ def test_the_limit_is_not_passed_and_a_higher_one_goes_on(workspace):
         assert same.code == 1
         assert server.requests == asked
 
-        more = workspace.run("--set", "limits.max_cost_usd=5")
-        assert (more.code, more.err) == (0, "")
+        more = workspace.completed("--set", "limits.max_cost_usd=5")
         assert "All 60 samples are done" in more.out
         assert server.requests == 60
 
@@ -77,13 +75,13 @@ def test_a_server_that_counts_more_than_is_expected_does_not_pass_the_limit_at_o
 ):
     usd = (prompt * PRICE["input"] + completion * PRICE["output"]) / 1e6
     usage = {"prompt_tokens": prompt, "completion_tokens": completion}
-    with Running(OpenAIChat(usage=usage)) as running:
-        workspace.write_models(running.url, "alpha", price=PRICE, max_tokens=100)
-        workspace.write_suite(models=["alpha"], seeds=list(range(12)))
+    with workspace.served(
+        OpenAIChat(usage=usage), entry={"price": PRICE, "max_tokens": 100}, seeds=list(range(12))
+    ) as server:
         done = workspace.run("--set", f"limits.max_cost_usd={5 * usd}")
     assert done.code == 1
     assert f"the next call can cost ${usd:.1f}"[:-2] in done.out
-    assert 1 < running.server.requests <= 5
+    assert 1 < server.requests <= 5
     assert spent(workspace) <= 5 * usd
 
 
@@ -130,9 +128,9 @@ def test_a_dry_run_says_what_it_would_cost_and_asks_nothing(workspace):
 )
 def test_what_an_earlier_run_may_have_paid_counts_in_the_next(workspace, server):
     dearest_reply_usd = 1000 * PRICE["output"] / 1e6
-    with Running(server) as running:
-        workspace.write_models(running.url, "alpha", price=PRICE, max_tokens=1000)
-        workspace.write_suite(models=["alpha"], seeds=list(range(4)), limits=TWICE)
+    with workspace.served(
+        server, entry={"price": PRICE, "max_tokens": 1000}, seeds=list(range(4)), limits=TWICE
+    ) as server:
         codes = [workspace.run("--set", "limits.max_cost_usd=1").code for _ in range(3)]
     assert codes == [1, 1, 1]
     assert 2 <= server.requests <= 1 / dearest_reply_usd
@@ -280,14 +278,15 @@ def test_episodes_are_billed_no_more_than_a_dry_run_expects(workspace):
 
 
 def test_a_run_without_a_limit_counts_once_there_is_one(workspace):
-    with Running(OpenAIChat(Faults(server_error=0.5))) as running:
-        workspace.write_models(running.url, "alpha", price=PRICE, max_tokens=100)
-        workspace.write_suite(
-            models=["alpha"], seeds=[0, 1, 2, 3], limits={**TWICE, "max_attempts": 1}
-        )
+    with workspace.served(
+        OpenAIChat(Faults(server_error=0.5)),
+        entry={"price": PRICE, "max_tokens": 100},
+        seeds=[0, 1, 2, 3],
+        limits={**TWICE, "max_attempts": 1},
+    ) as server:
         assert workspace.run("--yes").code == 1
-        asked, answered = running.server.requests, running.server.ended["ok"]
+        asked, answered = server.requests, server.ended["ok"]
         assert 0 < answered < asked == 20
         same = workspace.run("--set", f"limits.max_cost_usd={answered * CALL_USD}")
         assert same.code == 1
-        assert running.server.requests == asked
+        assert server.requests == asked

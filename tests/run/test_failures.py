@@ -55,9 +55,9 @@ def coverage(workspace: Workspace) -> dict[str, Raw]:
 @pytest.mark.parametrize("samples", [200, pytest.param(1000, marks=pytest.mark.slow)])
 def test_every_sample_is_scored_through_the_mix_of_faults(workspace, samples):
     faults = replace(ISSUE_MIX, retry_after="0")
-    with Running(OpenAIChat(faults, keep=False)) as running:
-        workspace.write_models(running.url, "alpha")
-        workspace.write_suite(models=["alpha"], seeds=list(range(samples // 5)))
+    with workspace.served(
+        OpenAIChat(faults, keep=False), seeds=list(range(samples // 5))
+    ) as server:
         done = workspace.run()
     assert (done.code, done.err) == (0, "")
     assert f"All {samples:,} samples are done" in done.out
@@ -66,10 +66,10 @@ def test_every_sample_is_scored_through_the_mix_of_faults(workspace, samples):
     assert {record["outcome"] for record in records} == {"ok"}
     assert all(is_scored(record) for record in records)
 
-    ended = running.server.ended
+    ended = server.ended
     assert ended["ok"] == samples
     assert ended.keys() >= {"429", "500", "reset"}
-    assert running.server.requests == sum(record["reply"]["attempts"] for record in records)
+    assert server.requests == sum(record["reply"]["attempts"] for record in records)
 
 
 def test_a_model_that_cannot_answer_is_stopped_alone(workspace):
@@ -122,9 +122,7 @@ def test_a_server_that_is_gone_stops_its_model_and_leaves_the_samples(workspace)
 def test_each_way_to_fail_is_an_outcome_of_its_own(workspace):
     endings = {1: "400", 2: "policy", 3: "length", 4: "filtered", 5: "blank"}
     outcomes = ("ok", "api_error", "refusal", "truncated", "refusal", "parse_failure")
-    with Running(BySeed(endings)) as running:
-        workspace.write_models(running.url, "alpha")
-        workspace.write_suite(models=["alpha"], seeds=[0, 1, 2, 3, 4, 5])
+    with workspace.served(BySeed(endings), seeds=[0, 1, 2, 3, 4, 5]) as server:
         done = workspace.run()
         # One request was rejected for good.
         assert done.code == 1
@@ -132,9 +130,9 @@ def test_each_way_to_fail_is_an_outcome_of_its_own(workspace):
         found = {(record["seed"], record["outcome"]) for record in records}
         assert found == set(enumerate(outcomes))
         assert all(is_scored(record) for record in records)
-        assert running.server.requests == 30
+        assert server.requests == 30
         assert workspace.run().out == done.out
-        assert running.server.requests == 30
+        assert server.requests == 30
     told = coverage(workspace)["alpha"]
     assert Counter({name: int(told[name]) for name in set(outcomes)}) == {
         name: 5 * outcomes.count(name) for name in outcomes
@@ -142,19 +140,17 @@ def test_each_way_to_fail_is_an_outcome_of_its_own(workspace):
 
 
 def test_a_sample_whose_every_attempt_failed_is_asked_again_by_the_next_run(workspace):
-    with Running(BySeed({1: "500"})) as running:
-        workspace.write_models(running.url, "alpha")
-        workspace.write_suite(models=["alpha"], seeds=[0, 1], limits=TWICE)
+    with workspace.served(BySeed({1: "500"}), seeds=[0, 1], limits=TWICE) as server:
         done = workspace.run()
         assert (done.code, done.err) == (1, "")
         assert "5 of 10 samples are done" in done.out
-        assert running.server.requests == 5 + 5 * 2
+        assert server.requests == 5 + 5 * 2
         assert coverage(workspace)["alpha"]["api_error"] == "5"
 
-        running.server._endings = {}
+        server._endings = {}
         again = workspace.run()
         assert again.code == 0
-        assert running.server.requests == 20
+        assert server.requests == 20
     assert coverage(workspace)["alpha"]["api_error"] == "0"
     assert "All 10 samples are done" in again.out
 
@@ -163,10 +159,8 @@ SAMPLES = 20
 AT_ONCE = 4
 
 
-def prepare(workspace: Workspace, url: str, at_once: int = 1) -> None:
-    workspace.write_models(url, "alpha")
-    limits = {"max_concurrency": at_once}
-    workspace.write_suite(models=["alpha"], seeds=[0, 1, 2, 3], limits=limits)
+def prepare(workspace: Workspace, server: OpenAIChat, at_once: int = 1) -> Any:
+    return workspace.served(server, seeds=[0, 1, 2, 3], limits={"max_concurrency": at_once})
 
 
 @contextlib.contextmanager
@@ -188,66 +182,57 @@ def test_a_cache_that_takes_no_more_is_said_once_and_all_is_recorded(workspace, 
         f"CREATE TRIGGER full BEFORE INSERT ON replies WHEN (SELECT count(*) FROM replies) >= "
         f"{room} BEGIN SELECT RAISE(ABORT, 'the disk is full'); END"
     )
-    with Running(OpenAIChat()) as running:
-        prepare(workspace, running.url)
-        done = workspace.run()
-        assert (done.code, done.err) == (0, "")
+    with prepare(workspace, OpenAIChat()) as server:
+        done = workspace.completed()
         (said,) = [line for line in done.out.splitlines() if "the disk is full" in line]
         assert str(path) in said
         assert "going on without it" in said
         assert f"All {SAMPLES} samples are done" in done.out
-        assert running.server.ended == {"ok": SAMPLES}
+        assert server.ended == {"ok": SAMPLES}
         assert [record["outcome"] for record in workspace.records()] == ["ok"] * SAMPLES
         with ReplyCache(path) as cache:
             assert sum(cache.counts().values()) == room
 
         db.execute("DROP TRIGGER full")
         db.close()
-        again = workspace.run()
-        assert (again.code, again.err) == (0, "")
-        assert running.server.requests == SAMPLES
+        workspace.completed()
+        assert server.requests == SAMPLES
 
 
 def test_a_disk_that_takes_neither_replies_nor_records_ends_the_run_after_few_calls(workspace):
-    with Running(OpenAIChat(Faults(latency_s=0.01))) as running:
-        prepare(workspace, running.url, AT_ONCE)
+    with prepare(workspace, OpenAIChat(Faults(latency_s=0.01)), AT_ONCE) as server:
         assert workspace.run("--limit", "1", "--models", "random").code == 0
         workspace.out = workspace.root / "full"
         done = workspace.run(bytes_left=20_000)
         assert done.code == 2
         assert len(done.errors) == 1
         kept = len(workspace.records())
-        asked = running.server.requests
+        asked = server.requests
         assert kept < SAMPLES
         assert asked - kept <= 2 * AT_ONCE
 
-        again = workspace.run()
-        assert (again.code, again.err) == (0, "")
-        assert running.server.requests <= asked + SAMPLES - kept
+        workspace.completed()
+        assert server.requests <= asked + SAMPLES - kept
         assert len({record["sample"] for record in workspace.records()}) == SAMPLES
 
 
 def test_ctrl_c_ends_a_run_whose_cache_is_locked(workspace):
-    with Running(OpenAIChat()) as running, locked(workspace):
-        prepare(workspace, running.url, AT_ONCE)
-        with workspace.start() as process:
-            while not catches(process.pid, signal.SIGTERM):
-                time.sleep(0.01)
-            time.sleep(1.0)
-            process.send_signal(signal.SIGINT)
-            out, err = process.communicate(timeout=60)
+    with prepare(workspace, OpenAIChat(), AT_ONCE), locked(workspace), workspace.start() as process:
+        while not catches(process.pid, signal.SIGTERM):
+            time.sleep(0.01)
+        time.sleep(1.0)
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=60)
     assert (process.returncode, err) == (130, "")
     assert "(interrupted)" in out
 
 
 @pytest.mark.slow
 def test_a_run_with_a_locked_cache_ends_as_without_one(workspace):
-    with Running(OpenAIChat()) as running, locked(workspace):
-        prepare(workspace, running.url, AT_ONCE)
-        done = workspace.run()
-        assert (done.code, done.err) == (0, "")
+    with prepare(workspace, OpenAIChat(), AT_ONCE) as server, locked(workspace):
+        done = workspace.completed()
         assert done.out.count("database is locked") == 1
-        assert running.server.requests == SAMPLES
+        assert server.requests == SAMPLES
 
 
 def catches(pid: int, number: signal.Signals) -> bool:

@@ -65,18 +65,14 @@ def interrupted(process: Forked, server: OpenAIChat, name: signal.Signals) -> tu
     return ended(process)
 
 
-def prepare(workspace: Workspace, url: str, *names: str) -> None:
-    workspace.write_models(url, *names)
-    workspace.write_suite(
-        models=list(names), seeds=[0, 1, 2, 3], limits={"max_concurrency": AT_ONCE}
-    )
+def prepare(workspace: Workspace, server: OpenAIChat, *names: str) -> Any:
+    limits = {"max_concurrency": AT_ONCE}
+    return workspace.served(server, *names, seeds=[0, 1, 2, 3], limits=limits)
 
 
 @pytest.mark.parametrize("name", [signal.SIGINT, signal.SIGTERM])
 def test_calls_under_way_are_waited_for_and_nothing_more_is_asked(workspace, name):
-    with Running(OpenAIChat(holds=True)) as running:
-        server = running.server
-        prepare(workspace, running.url, "alpha")
+    with prepare(workspace, OpenAIChat(holds=True)) as server:
         code, out, err = interrupted(workspace.start(), server, name)
 
         assert (code, err) == (130, "")
@@ -86,8 +82,7 @@ def test_calls_under_way_are_waited_for_and_nothing_more_is_asked(workspace, nam
         assert [record["outcome"] for record in workspace.records()] == ["ok"] * AT_ONCE
 
         server.faults = Faults()
-        done = workspace.run()
-        assert (done.code, done.err) == (0, "")
+        done = workspace.completed()
         assert f"All {SAMPLES} samples are done" in done.out
         assert server.requests == SAMPLES
         before = workspace.files()
@@ -98,10 +93,9 @@ def test_calls_under_way_are_waited_for_and_nothing_more_is_asked(workspace, nam
 
 
 def test_a_second_interrupt_ends_at_once(workspace):
-    with Running(OpenAIChat(Faults(mode="slow"))) as running:
-        prepare(workspace, running.url, "alpha")
+    with prepare(workspace, OpenAIChat(Faults(mode="slow"))) as server:
         process = workspace.start()
-        wait_for(lambda: running.server.at_once == AT_ONCE)
+        wait_for(lambda: server.at_once == AT_ONCE)
         process.send_signal(signal.SIGINT)
         said = process.stdout.readline()
         assert "Ctrl-C again" in said
@@ -131,9 +125,7 @@ def test_a_program_is_interrupted_in_a_run_as_well_at_any_time(workspace):
     opening, asking, waiting = folders = [workspace.root / name for name in ("a", "b", "c")]
     told = workspace.root / "told"
     slow = OpenAIChat(Faults(latency_s=1.0))
-    with Running(slow) as running, told.open("w", encoding="utf-8") as errors:
-        server = running.server
-        prepare(workspace, running.url, "alpha")
+    with prepare(workspace, slow) as server, told.open("w", encoding="utf-8") as errors:
         locked = sqlite3.connect(workspace.cache / "replies.sqlite", isolation_level=None)
         locked.execute("BEGIN EXCLUSIVE")
         process = subprocess.Popen(
@@ -333,8 +325,7 @@ def test_a_reply_that_is_being_judged_at_a_second_interrupt_is_recorded(
 def test_no_process_outlives_a_killed_run(workspace):
     """Pictures are drawn by processes of the run's own."""
     (workspace.cache / "pictures").unlink()
-    with Running(OpenAIChat()) as running:
-        prepare(workspace, running.url, "alpha")
+    with prepare(workspace, OpenAIChat()):
         with workspace.start("--yes") as process:
             family: list[psutil.Process] = []
             while not any("phyblock.workers" in " ".join(words_of(child)) for child in family):
@@ -354,9 +345,7 @@ def words_of(process: psutil.Process) -> list[str]:
 
 
 def test_calls_that_wait_for_their_turn_are_not_sent_any_more(workspace):
-    with Running(OpenAIChat(holds=True)) as running:
-        server = running.server
-        prepare(workspace, running.url, "alpha", "beta")
+    with prepare(workspace, OpenAIChat(holds=True), "alpha", "beta") as server:
         code, _, _ = interrupted(workspace.start(), server, signal.SIGINT)
     assert code == 130
     assert server.requests == AT_ONCE
@@ -364,9 +353,7 @@ def test_calls_that_wait_for_their_turn_are_not_sent_any_more(workspace):
 
 
 def test_a_wait_before_another_attempt_is_given_up(workspace):
-    with Running(OpenAIChat(Faults(rate_limited=1.0, retry_after="100"))) as running:
-        server = running.server
-        prepare(workspace, running.url, "alpha")
+    with prepare(workspace, OpenAIChat(Faults(rate_limited=1.0, retry_after="100"))) as server:
         process = workspace.start()
         wait_for(lambda: server.requests == AT_ONCE and not server.at_once)
         process.send_signal(signal.SIGINT)
@@ -378,7 +365,8 @@ def test_a_wait_before_another_attempt_is_given_up(workspace):
 
 
 def test_a_wait_for_a_server_that_cannot_be_reached_is_given_up(workspace):
-    prepare(workspace, "http://127.0.0.1:9", "alpha")
+    workspace.write_models("http://127.0.0.1:9", "alpha")
+    workspace.write_suite(models=["alpha"], seeds=[0, 1, 2, 3])
     process = workspace.start()
     while "http://127.0.0.1:9 cannot be reached" not in process.stdout.readline():
         assert process.poll() is None

@@ -189,10 +189,9 @@ def test_tables_and_page_are_made_again_where_the_run_or_what_was_made_is_anothe
 
 
 def test_a_run_whose_records_are_taken_away_asks_no_more_and_says_so(workspace):
-    with Running(OpenAIChat(Faults(latency_s=0.02))) as running:
-        server = running.server
-        workspace.write_models(running.url, "alpha", max_concurrency=2)
-        workspace.write_suite(models=["alpha"], seeds=list(range(20)))
+    with workspace.served(
+        OpenAIChat(Faults(latency_s=0.02)), entry={"max_concurrency": 2}, seeds=list(range(20))
+    ) as server:
         with workspace.start("--yes") as process:
             while process.poll() is None and server.requests < 10:
                 time.sleep(0.002)

@@ -91,8 +91,7 @@ def test_replies_from_the_cache_are_worth_the_same(copy):
     # The server is gone: whatever is answered comes from the cache.
     first = scores(copy.records())
     copy.out = copy.root / "cached"
-    done = copy.run()
-    assert (done.code, done.err) == (0, "")
+    done = copy.completed()
     asked = [record for record in copy.records() if record["model"] == "alpha"]
     assert f"{len(asked)} came from the reply cache" in done.out
     assert all(r["reply"]["cached"] and r["reply"]["attempts"] == 0 for r in asked)
@@ -106,8 +105,7 @@ def test_other_rules_score_the_same_replies_without_a_call(copy):
     first = [record.get("reply", {}).get("text") for record in copy.records()]
     copy.out = copy.root / "official"
     rules = ("--set", "parser=official", "--set", "scoring.matchers=[paper]")
-    done = copy.run(*rules)
-    assert (done.code, done.err) == (0, "")
+    copy.completed(*rules)
     records = copy.records()
     assert {record["parse"]["parser"] for record in records} == {"official"}
     assert sorted(map(str, first)) == sorted(str(r.get("reply", {}).get("text")) for r in records)
@@ -133,29 +131,26 @@ def test_a_cut_last_line_is_dropped_and_its_sample_run_again(copy):
     path = copy.out / "records.jsonl"
     whole = path.read_bytes()
     path.write_bytes(whole[:-30])
-    done = copy.run()
-    assert (done.code, done.err) == (0, "")
+    copy.completed()
     assert len(copy.records()) == 45
     assert path.read_bytes().startswith(whole[:-30].rpartition(b"\n")[0])
     assert load_run(copy.out).records["sample"].is_unique
 
 
 def test_a_second_process_is_refused_and_the_first_goes_on(workspace):
-    with Running(OpenAIChat(holds=True)) as running:
-        workspace.write_models(running.url, "alpha")
-        workspace.write_suite(models=["alpha"])
+    with workspace.served(OpenAIChat(holds=True)) as server:
         with workspace.start() as first:
-            while not running.server.at_once:
+            while not server.at_once:
                 time.sleep(0.01)
             second = workspace.run()
-            running.server.holds = False
+            server.holds = False
             out, err = first.communicate()
         assert second.code == 2
         assert "out: is being written by another phyblock run" in second.err
         assert len(second.errors) == 1
         assert (first.returncode, err) == (0, "")
         assert "All 5 samples are done" in out
-        assert running.server.requests == 5
+        assert server.requests == 5
 
 
 def test_a_limit_keeps_some_of_every_level_and_is_a_run_of_its_own(copy):
@@ -173,8 +168,7 @@ def test_what_does_not_change_results_does_not_make_another_run(copy):
     labels = {"size_b": 7, "published": "GPT-4o", "price": {"input": 1.0, "output": 2.0}}
     copy.write_models("http://127.0.0.1:9", "alpha", transport="litellm", **labels)
     sets = ("--set", "limits.max_concurrency=1", "--set", "description=x")
-    done = copy.run(*sets, "--models", "oracle,random,alpha")
-    assert (done.code, done.err) == (0, "")
+    done = copy.completed(*sets, "--models", "oracle,random,alpha")
     assert "All 45 samples are done" in done.out
 
 
@@ -182,11 +176,9 @@ def test_what_does_not_change_results_does_not_make_another_run(copy):
 def test_more_models_and_seeds_go_on_in_the_folder_and_fewer_select_from_it(workspace, order):
     workspace.write_scenes()
     workspace.write_suite(models=["random"], seeds=[1, 0], candidates={"order": order})
-    first = workspace.run()
-    assert (first.code, first.err) == (0, "")
+    workspace.completed()
     before, lines = workspace.tables(), workspace.records()
-    more = workspace.run("--models", "oracle,random", "--set", "seeds=[0,1,2]")
-    assert (more.code, more.err) == (0, "")
+    more = workspace.completed("--models", "oracle,random", "--set", "seeds=[0,1,2]")
     assert "All 30 samples are done" in more.out
     assert workspace.records()[: len(lines)] == lines
     whole = workspace.tables()
@@ -214,9 +206,7 @@ def test_a_model_that_is_asked_otherwise_makes_another_run(copy):
 def test_a_folder_that_holds_no_record_is_free_for_the_mended_suite(workspace):
     template = workspace.root / "mine.j2"
     template.write_text("{% block user %}{{ wrong }}{% endblock %}", encoding="utf-8")
-    with Running(OpenAIChat()) as running:
-        workspace.write_models(running.url, "alpha")
-        workspace.write_suite(models=["alpha"], prompt="mine.j2")
+    with workspace.served(OpenAIChat(), prompt="mine.j2"):
         assert workspace.run().code == 2
         template.write_text("{% block user %}right{% endblock %}", encoding="utf-8")
         done = workspace.run()
@@ -228,8 +218,7 @@ def test_baselines_need_no_replies_kept_and_nothing_is_drawn_for_them(workspace,
     (workspace.cache / "replies.sqlite").mkdir()
     (workspace.cache / "pictures").unlink()
     workspace.write_suite(models=["random", "oracle"], tracks=[track])
-    done = workspace.run()
-    assert (done.code, done.err) == (0, "")
+    workspace.completed()
     records = workspace.records()
     assert len(records) == 10
     assert {record["outcome"] for record in records} == {"ok"}
@@ -274,14 +263,11 @@ def test_answers_to_two_versions_of_questions_are_not_mixed():
 
 def test_a_record_is_one_line_of_json_whatever_the_reply_holds(workspace):
     text = "Step1: Move block with index 1\n\u2028\x85\r\0\ud800 ￿ 😀"
-    with Running(OpenAIChat(say=lambda _: text)) as running:
-        workspace.write_models(running.url, "alpha")
-        workspace.write_suite(models=["alpha"])
-        done = workspace.run()
-        assert (done.code, done.err) == (0, "")
+    with workspace.served(OpenAIChat(say=lambda _: text)) as server:
+        done = workspace.completed()
         again = workspace.run()
         assert (again.code, again.out) == (0, done.out)
-        assert running.server.requests == 5
+        assert server.requests == 5
     lines = (workspace.out / "records.jsonl").read_bytes().split(b"\n")[:-1]
     assert len(lines) == 5
     assert all("😀" in json.loads(line)["reply"]["text"] for line in lines)

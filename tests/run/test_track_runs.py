@@ -269,17 +269,14 @@ FEW = ("--limit", "3")
 VOLATILE = ("time", "latency_s", "attempts", "cached", "run")
 
 
-def prepare(workspace: Workspace, url: str, **fields: Any) -> None:
-    workspace.write_models(url, "alpha")
-    suite = {
-        "tracks": ["step_planning"],
-        "models": ["alpha"],
-        "images": {"size_px": 128, "layout": "separate"},
-        "limits": {"max_concurrency": AT_ONCE, "max_attempts": 8},
-        "steps": {"physics": "off"},
-        **fields,
-    }
-    workspace.write_suite(**suite)
+def prepare(workspace: Workspace, server: StepAgent) -> Any:
+    return workspace.served(
+        server,
+        tracks=["step_planning"],
+        images={"size_px": 128, "layout": "separate"},
+        limits={"max_concurrency": AT_ONCE, "max_attempts": 8},
+        steps={"physics": "off"},
+    )
 
 
 def stable(value: Any) -> Any:
@@ -294,10 +291,9 @@ def by_sample(records: list[dict[str, Any]]) -> dict[str, Any]:
 
 
 def test_the_server_sees_goal_candidates_current_picture_and_history(workspace):
-    with Running(StepAgent()) as running:
-        prepare(workspace, running.url)
+    with prepare(workspace, StepAgent()) as server:
         assert workspace.run().code == 0
-        seen = running.server.seen
+        seen = server.seen
     records = workspace.records()
     assert sum(len(record["turns"]) for record in records) == len(seen)
     answers = {one.sample: one for one in seen}
@@ -327,8 +323,7 @@ def test_the_server_sees_goal_candidates_current_picture_and_history(workspace):
 def test_faults_change_nothing(workspace):
     found = []
     for faults in (Faults(), ISSUE_MIX):
-        with Running(StepAgent(Faults(**{**vars(faults), "retry_after": "0"}))) as running:
-            prepare(workspace, running.url)
+        with prepare(workspace, StepAgent(Faults(**{**vars(faults), "retry_after": "0"}))):
             workspace.out = workspace.root / f"out{len(found)}"
             assert workspace.run("--no-cache", *FEW).code == 0
             found.append(by_sample(workspace.records()))
@@ -391,7 +386,6 @@ def test_runs_in_two_engines_are_scored_anywhere_and_never_compared(inside, monk
 
 @pytest.mark.parametrize(("mode", "outcome"), [("length", "truncated"), ("filtered", "refusal")])
 def test_an_episode_of_which_no_reply_is_whole_is_no_parse_failure(workspace, mode, outcome):
-    with Running(StepAgent(Faults(mode=mode))) as running:
-        prepare(workspace, running.url)
+    with prepare(workspace, StepAgent(Faults(mode=mode))):
         assert workspace.run(*FEW).code == 0
     assert {record["outcome"] for record in workspace.records()} == {outcome}

@@ -86,7 +86,7 @@ def summary(score: PoseScore) -> tuple[object, ...]:
     return score.right, len(fits), far, shared
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(scenes(), st.integers(0, 99))
 def test_a_valid_order_at_true_poses_is_wholly_right(drawn, seed):
     scene, candidates = drawn
@@ -96,7 +96,7 @@ def test_a_valid_order_at_true_poses_is_wholly_right(drawn, seed):
         assert all(fit is not None and fit.iou in (1, None) for fit in score.fits)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(scenes(), st.integers(0, 99), st.sampled_from([0.002, 0.01, 0.04]), st.data())
 def test_no_more_steps_are_right_than_without_poses_and_wider_tolerances_lose_none(
     drawn, seed, sigma_m, data
@@ -112,7 +112,7 @@ def test_no_more_steps_are_right_than_without_poses_and_wider_tolerances_lose_no
         assert score.right[-1] <= most
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     scenes(),
     st.integers(0, 999),
@@ -138,7 +138,7 @@ def test_aligned_does_not_change_when_the_whole_plan_is_shifted_and_turned(
         assert max(fit.position_cm for fit in other.fits if fit is not None) < 1e-3
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(scenes(), st.randoms(use_true_random=False), st.sampled_from([0.005, 0.015, 0.03]))
 def test_the_best_motion_of_a_plan_is_no_worse_than_none(drawn, random, sigma_m):
     """Also where steps come in an order that is not valid, or some are anywhere."""
@@ -153,7 +153,7 @@ def test_the_best_motion_of_a_plan_is_no_worse_than_none(drawn, random, sigma_m)
         assert aligned.right == absolute.right
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(scenes(), st.integers(0, 99), st.data())
 def test_symmetries_and_the_order_of_equal_blocks_in_the_file_change_nothing(drawn, seed, data):
     scene, candidates = drawn
@@ -197,7 +197,7 @@ def test_assignments_are_as_cheap_as_those_of_scipy(rows, columns, seed):
     assert sum(cost[p] for p in pairs) == pytest.approx(cost[linear_sum_assignment(cost)].sum())
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(st.integers(1, 5), st.integers(1, 6), st.integers(0, 9999))
 def test_steps_are_matched_at_the_least_cost_of_all_valid_ways(n_blocks, n_steps, seed):
     """Against every way there is."""
@@ -247,7 +247,7 @@ def test_pieces_fill_their_block_and_its_symmetries_map_it_onto_itself(block_typ
         assert turn_deg(block_type, rotation, np.eye(3)) == pytest.approx(0, abs=1e-4)
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.sampled_from(BLOCK_TYPES), st.sampled_from(BLOCK_TYPES), st.integers(0, 999))
 def test_shared_volumes_agree_with_points_drawn_at_random(one, other, seed):
     rng = np.random.default_rng(seed)

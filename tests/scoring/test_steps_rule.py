@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.domain.scene import AssemblyTask, Block, Candidate, CandidateSet, Plan, Scene
@@ -76,7 +76,6 @@ def right(case: Case, setting: Setting) -> list[int]:
     ]
 
 
-@settings(deadline=None)
 @given(cases(), any_setting, any_gating, st.randoms(use_true_random=False))
 def test_a_valid_order_never_fails_whatever_looks_alike(case, setting, gating, random):
     numbers = right(case, setting)
@@ -90,7 +89,6 @@ def test_a_valid_order_never_fails_whatever_looks_alike(case, setting, gating, r
     assert assembly.is_complete
 
 
-@settings(deadline=None)
 @given(cases(max_steps=14), any_setting, any_gating)
 def test_the_world_is_always_one_that_can_be_built(case, setting, gating):
     """Whatever is placed has all that it depends on, and the right moves are those that work."""
@@ -111,7 +109,6 @@ def test_the_world_is_always_one_that_can_be_built(case, setting, gating):
             assert (assembly.vertices, move.vertex, move.swapped) == (before, None, ())
 
 
-@settings(deadline=None)
 @given(cases(max_steps=14), any_setting)
 def test_a_wrong_move_has_the_error_type_of_its_moment(case, setting):
     assembly = Assembly(case.scene, case.candidates, setting)
@@ -129,7 +126,6 @@ def test_a_wrong_move_has_the_error_type_of_its_moment(case, setting):
             assert outcome in ("placed", "dependency_not_met")
 
 
-@settings(deadline=None)
 @given(cases(max_steps=14), any_setting)
 def test_no_more_is_placed_than_the_optimal_matcher_allows(case, setting):
     assembly = Assembly(case.scene, case.candidates, setting)
@@ -140,7 +136,6 @@ def test_no_more_is_placed_than_the_optimal_matcher_allows(case, setting):
     assert outcomes.count("placed") <= match_plan(goal, case.plan, "optimal").counts.tp
 
 
-@settings(deadline=None)
 @given(cases(), st.integers(-(10**9), 10**9))
 def test_a_number_that_no_candidate_has_is_invalid(case, index):
     assembly = Assembly(case.scene, case.candidates, "A")
@@ -189,7 +184,6 @@ def test_layers_wait_for_the_whole_layer_below():
     }
 
 
-@settings(deadline=None)
 @given(cases(max_steps=14), any_setting)
 def test_every_placed_block_is_right_under_the_setting_that_let_it(case, setting):
     assembly = Assembly(case.scene, case.candidates, setting)

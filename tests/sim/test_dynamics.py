@@ -140,7 +140,7 @@ WHEELS = built("2 cylinder:lying-x 2; cuboid3:flat-y; cube -2; cylinder:lying-y 
 shifts_m = st.floats(-1, 1).map(lambda meters: round(meters, 6))
 
 
-@settings(max_examples=4, deadline=None)
+@settings(max_examples=4)
 @given(shifts_m, shifts_m)
 def test_no_verdict_depends_on_a_place(x_m, y_m):
     moved = [

@@ -136,7 +136,7 @@ def share_a_point(first: ConvexPiece, second: ConvexPiece) -> bool:
 
 
 @given(block_types, eulers, block_types, eulers, shifts_m, shifts_m, shifts_m)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_separation_agrees_with_a_linear_program(one, turn, other, twist, x, y, z):
     first = placed(block(1, one, (0.0, 0.0, 0.0), turn))[0]
     second = placed(block(2, other, (x, y, z), twist))[0]
@@ -147,7 +147,7 @@ def test_separation_agrees_with_a_linear_program(one, turn, other, twist, x, y, 
 
 
 @given(block_types, eulers, block_types, eulers, shifts_m, shifts_m)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_a_block_falls_just_until_it_touches(one, turn, other, twist, x, y):
     first = placed(block(1, one, (0.0, 0.0, 0.0), turn))[0]
     second = placed(block(2, other, (x, y, 0.4), twist))[0]
@@ -161,7 +161,7 @@ def test_a_block_falls_just_until_it_touches(one, turn, other, twist, x, y):
 
 
 @given(angles_deg, shifts_m, shifts_m, st.integers(1, 5))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_support_of_a_turned_tower(angle_deg, x, y, height):
     graph = support_graph(turned(tower(height), angle_deg, (x, y)))
     assert graph == {i + 1: frozenset({i}) for i in range(height)}

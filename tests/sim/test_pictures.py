@@ -156,7 +156,7 @@ def test_no_built_in_picture_is_cut_open_and_blocks_of_wide_goals_are_large(ever
 
 
 @given(st.lists(st.sampled_from(EVERY_LOOK), min_size=1, max_size=16), st.floats(1, 89))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_all_candidates_of_a_grid_have_one_scale_and_the_largest_fills_its_cell(looks, elevation):
     style = replace(STYLE, elevation_deg=elevation)
     blocks = [on_the_floor(*look.look[:2], look.euler_deg) for look in looks]
@@ -267,7 +267,7 @@ def test_any_orientation_comes_back_from_its_quaternion(x, y, z):
 
 
 @given(clouds(), st.integers(1, 6), angles, elevations)
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_no_picture_is_cut_off_or_open_whatever_it_frames(blocks, framed, azimuth, elevation):
     """Not even where blocks lie behind the place from which those in the frame are seen best."""
     style = PictureStyle(azimuth_deg=azimuth, elevation_deg=elevation)
@@ -318,7 +318,7 @@ def test_a_state_is_seen_as_the_goal_is_and_changes_where_a_block_comes():
         assert 0 < (before != after).any(axis=2).mean() < 0.5
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     st.lists(st.tuples(*[st.floats(-0.4, 0.4)] * 2, st.floats(0.025, 0.3)), min_size=1, max_size=4),
     st.floats(0, 360),

@@ -114,7 +114,7 @@ def is_hidden(
 
 
 @given(clouds() | heaps(), views, st.integers(0, 2**31))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_each_pixel_shows_what_the_ray_through_its_center_meets(blocks, view, seed):
     props = props_of(blocks)
     camera = camera_on(props, view)
@@ -130,7 +130,7 @@ def test_each_pixel_shows_what_the_ray_through_its_center_meets(blocks, view, se
 
 
 @given(heaps(), views, st.integers(0, 2**31))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_a_pixel_is_as_bright_as_its_face_and_what_stands_before_the_light_say(blocks, view, seed):
     """Points near the edge of a shadow are left out; round faces bend between their facets."""
     props = props_of(blocks)
@@ -154,7 +154,7 @@ def test_a_pixel_is_as_bright_as_its_face_and_what_stands_before_the_light_say(b
 
 
 @given(clouds(), views, st.integers(0, 2**31))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_the_ground_is_in_shadow_where_something_stands_before_the_light(blocks, view, seed):
     props = props_of(blocks)
     camera = camera_on(props, view)
@@ -168,7 +168,7 @@ def test_the_ground_is_in_shadow_where_something_stands_before_the_light(blocks,
 
 
 @given(clouds(), views, st.randoms(use_true_random=False))
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_the_order_of_blocks_changes_their_numbers_alone(blocks, view, random):
     props = props_of(blocks)
     camera = camera_on(props, view)

@@ -171,7 +171,7 @@ def drawn_sets(draw: st.DrawFn) -> tuple[list[Scene], dict[str, CandidateSet]]:
 
 
 @given(drawn_sets(), st.sampled_from(["A", "B"]), st.booleans())
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 def test_a_plan_names_candidates_of_its_set(drawn, setting, repeats):
     scenes, sets = drawn
     plans = goal_blind_plans(scenes, sets, setting, repeats=repeats)
@@ -183,7 +183,7 @@ def test_a_plan_names_candidates_of_its_set(drawn, setting, repeats):
 
 
 @given(drawn_sets(), st.sampled_from(["A", "B"]), st.data())
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 def test_no_goal_has_a_part_in_what_is_learned_for_its_own_base_scene(drawn, setting, data):
     """Another goal in place of a scene's own changes no chance in the scenes it is related to."""
     scenes, sets = drawn

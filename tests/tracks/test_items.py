@@ -8,7 +8,7 @@ from itertools import pairwise, permutations
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.domain.scene import AOVGraph, AssemblyTask, Candidate, CandidateSet
@@ -97,7 +97,6 @@ def _track(name: str) -> Any:
 
 
 @given(st.integers(0, 4), seeds, st.lists(st.integers(-1, 18), max_size=5))
-@settings(deadline=None)
 def test_an_episode_goes_the_same_in_either_numbering(tasks, place, seed, moves):
     async def play(task: AssemblyTask, steps: Any) -> dict[str, Any]:
         episode = _track("step_planning").start(task, 0, {}, with_messages=False)

@@ -153,7 +153,7 @@ def test_where_blocks_came_to_lie_follows_from_what_each_step_moved(built_in, ba
             assert start.angle_deg(end) < 1.1
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=12)
 @given(st.lists(st.sampled_from([1, 1, 3, 3, 2, 17, 0]), max_size=4))
 def test_without_poses_a_plan_is_scored_as_full_planning_scores_it(task, numbers):
     """Far from one another, so that nothing falls on anything."""

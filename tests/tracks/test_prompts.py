@@ -66,7 +66,7 @@ def test_parts_are_included_and_imported(tmp_path, body, said):
 
 
 @given(first=st.text("ab", max_size=3), second=st.text("ab", max_size=3))
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 def test_an_edit_of_what_is_included_is_another_prompt(tmp_path_factory, first, second):
     versions = [
         prompt(
@@ -127,7 +127,7 @@ def test_what_is_wrong_is_said_with_file_and_line(tmp_path, body, part, where, s
     assert where in problem.where
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(TEMPLATES)
 def test_any_bytes_are_a_prompt_or_a_prompt_error(tmp_path_factory, data):
     path = tmp_path_factory.getbasetemp() / "law.j2"

@@ -171,7 +171,6 @@ def test_no_hostile_reply_stops_an_episode():
         json.dumps(fields, allow_nan=False, default=str)
 
 
-@settings(deadline=None)
 @given(st.lists(st.sampled_from(["Move(1)", "Move(3)", "Move(6)", "?", "Move(40)"]), max_size=60))
 def test_whatever_is_said_the_default_limits_end_it_the_same_way(texts):
     task = tower("red", "blue", "red", "blue")
@@ -235,7 +234,7 @@ def test_a_collapse_ends_an_episode_under_strict_physics_alone(physics, ending, 
     assert fields["ending"] == "completed"
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(
     st.lists(st.sampled_from([1, 2, 6, None]), min_size=1, max_size=12),
     st.integers(1, 4),

@@ -17,7 +17,7 @@ from phyblock.results.load import Run, design_of, frames_of
 from phyblock.scoring.plan import BLOCK_OUTCOMES, ERROR_TYPES
 from phyblock.types import OUTCOMES
 
-laws = settings(max_examples=8, deadline=None)
+laws = settings(max_examples=8)
 """Tables take some 50 ms each, so that few examples must do."""
 
 LEVELS = {"000": (1, 2), "001": (2,), "002": (3,), "003": (4,), "004": (1,)}
