@@ -17,13 +17,13 @@ import zipfile
 import zlib
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from importlib.metadata import version
 from itertools import zip_longest
 from pathlib import Path
 
-from phyblock.errors import DataError, Problem, SpecError, StoreError, reason_of
+from phyblock.errors import DataError, InputError, Problem, SpecError, StoreError, reason_of
 from phyblock.files import (
     OutFolder,
     bundled,
@@ -133,27 +133,33 @@ def opened_bundle(path: Path, data: Sequence[Path] = ()) -> Iterator[Verified]:
     with tempfile.TemporaryDirectory(prefix="phyblock-") as scratch:
         folder = Path(scratch, path.name)
         folder.mkdir()
-        made_by = unpack(path, folder)
-        manifest = read_manifest(folder)
-        here = _localized(folder, manifest, data)
-        (folder / MANIFEST).write_text(manifest_text(here), encoding="utf-8")
-        judged, again = judged_again(folder)
-        counted = ("items", "scenes", "scenes_by_level")
-        differ = [name for name in counted if getattr(here, name) != getattr(judged, name)]
-        if differ or not here.models:
-            raise _differs(folder / MANIFEST, ", ".join(differ) or "models", made_by)
-        count, seen = 0, set[str]()
-        with (folder / RECORDS).open("rb") as stored:
-            for count, (was, record) in enumerate(zip_longest(stored, again), 1):
-                where = f"{folder / RECORDS}:{count}"
-                now = "" if record is None else next(record_lines([record]))
-                if record is None or was != now.encode() or record.sample in seen:
-                    raise _differs(where, "", made_by)
-                seen.add(record.sample)
-        expected = design_of(here, str(path)).all_samples
-        physics = ", ".join(kind.title for kind in simulating(here.suite))
-        fell = [f"{physics}: what fell, which is taken from the records."] if physics else []
-        yield Verified(made_by, here, folder, count, expected, (*fell, *_NEVER_VERIFIED))
+        try:
+            made_by = unpack(path, folder)
+            manifest = read_manifest(folder)
+            here = _localized(folder, manifest, data)
+            (folder / MANIFEST).write_text(manifest_text(here), encoding="utf-8")
+            judged, again = judged_again(folder)
+            counted = ("items", "scenes", "scenes_by_level")
+            differ = [name for name in counted if getattr(here, name) != getattr(judged, name)]
+            if differ or not here.models:
+                raise _differs(folder / MANIFEST, ", ".join(differ) or "models", made_by)
+            count, seen = 0, set[str]()
+            with (folder / RECORDS).open("rb") as stored:
+                for count, (was, record) in enumerate(zip_longest(stored, again), 1):
+                    where = f"{folder / RECORDS}:{count}"
+                    now = "" if record is None else next(record_lines([record]))
+                    if record is None or was != now.encode() or record.sample in seen:
+                        raise _differs(where, "", made_by)
+                    seen.add(record.sample)
+            expected = design_of(here, str(path)).all_samples
+            physics = ", ".join(kind.title for kind in simulating(here.suite))
+            fell = [f"{physics}: what fell, which is taken from the records."] if physics else []
+            yield Verified(made_by, here, folder, count, expected, (*fell, *_NEVER_VERIFIED))
+        except InputError as error:
+            shown = [
+                replace(p, where=p.where.replace(str(folder), str(path))) for p in error.problems
+            ]
+            raise type(error)(shown) from error
 
 
 def _differs(where: object, field: str, made_by: str) -> StoreError:

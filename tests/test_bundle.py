@@ -118,6 +118,7 @@ def test_a_bundle_verifies_elsewhere_and_holds_nothing_of_this_machine(made, tmp
     for data, lacking in ((["--data", "data"], "questions questions"), ([], "data set data")):
         done = elsewhere.phyblock("verify", "b.zip", *data)
         assert (done.code, "Traceback" in done.err) == (2, False)
+        assert done.err.startswith("error: b.zip: data.")
         assert f"needs the {lacking}, which a bundle does not hold" in done.err
 
 

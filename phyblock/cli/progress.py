@@ -135,7 +135,7 @@ class ProgressView:
         elif isinstance(event, ModelEvent) and event.kind == "retry":
             tally = self._tallies[event.model]
             tally.retries += 1
-            tally.last_retry = f"{event.message}; waiting {event.wait_s:.0f} s"
+            tally.last_retry = f"{event.message}; waiting {round(event.wait_s, 1):g} s"
             self._has_asked = True
         elif isinstance(event, ModelEvent):
             # A batch that was sent has no calls in progress.

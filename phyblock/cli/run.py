@@ -62,8 +62,6 @@ from phyblock.tracks.base import kind_of
 from phyblock.workers import open_workers
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
-_OBJECTS = 50_000
-"""So many new objects are made before garbage is collected; a sample makes few in cycles."""
 
 
 @click.command(epilog=f"Bundled suites: {', '.join(bundled_suites())}.")
@@ -142,7 +140,6 @@ def run(
     # Suite, scenes and modules stay to the end: collecting garbage among them repeatedly takes a
     # tenth of a run. So do records, while tables are made from them.
     gc.freeze()
-    gc.set_threshold(_OBJECTS)
     if not is_as_it_was:
         Thread(target=_import_for_tables).start()
     with ProgressView(console) as view:
@@ -203,6 +200,9 @@ def print_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) ->
         "cost": lambda row: _dollars(row.cost_usd) if row.calls else NO_VALUE,
         "at most": lambda row: _dollars(row.most_usd) if row.calls else NO_VALUE,
     }
+    if not asked:
+        console.print(f"{plan.suite.name}: {', '.join(facts)}. No call is needed.")
+        return
     cells = {heading: [text(row) for row in asked] for heading, text in columns.items()}
     cells = {heading: texts for heading, texts in cells.items() if set(texts) - {"0"}}
     headings = (Column("model", is_text=True), *map(Column, cells))

@@ -200,10 +200,13 @@ def _config(name: str, known: Mapping[str, ModelConfig]) -> ModelConfig:
 
 @models.command()
 @click.argument("name")
+@models_file_option
 @yes_option
 @click.pass_obj
-def check(known: Mapping[str, ModelConfig], name: str, yes: bool) -> int:
+def check(known: Mapping[str, ModelConfig], name: str, models_file: str | None, yes: bool) -> int:
     """Make one tiny call to each server of the model NAME, and print the answer."""
+    if models_file is not None:
+        known = load_models(find_models_file(models_file, None))
     from phyblock.models.costs import is_billed
     from phyblock.models.litellm_client import be_quiet
 

@@ -208,7 +208,8 @@ def levels(run: Run, *, track: str) -> Figure | None:
     if measure.unit == "%":
         ax.set_ylim(0, 102)
     more = f"; the other {len(models) - _NAMED} pale" if len(models) > _NAMED else ""
-    title, how = f"{kind_of(track).title}: {measure.heading} by part", "the best of all first"
+    parts = "level" if columns[0].heading.startswith("Level") else "category"
+    title, how = f"{kind_of(track).title}: {measure.heading} by {parts}", "the best of all first"
     return _finished(figure, run, title, f"{how}{more}", grid="y", reverse=True)
 
 

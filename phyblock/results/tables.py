@@ -245,7 +245,7 @@ def coverage_table(run: Run) -> TextTable:
     return TextTable.of(table[_COVERAGE], f"Coverage{run.design.of_suite}", fields, notes)
 
 
-_HEADINGS = {"ok": "OK", "parse_failure": "Unparsed", "api_error": "API error"}
+_HEADINGS = {"ok": "OK", "parse_failure": "Parse failure", "api_error": "API error"}
 
 
 def cost_table(run: Run) -> TextTable:

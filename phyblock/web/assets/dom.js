@@ -45,7 +45,7 @@ const listOf = (pairs, kind = "about") => el("dl", { class: kind },
 const Words = (() => {
   const DASH = "–";
   const names = {
-    ok: "OK", parse_failure: "Unparsed", refusal: "Refusal", truncated: "Truncated",
+    ok: "OK", parse_failure: "Parse failure", refusal: "Refusal", truncated: "Truncated",
     api_error: "API error", missing: "Missing",
     shape_not_in_gt: "Shape not in GT", overflow: "Overflow",
     incorrect_orientation: "Incorrect orientation", dependency_not_met: "Dependency not met",
