@@ -231,7 +231,7 @@ def test_what_is_in_the_way_is_named_and_stays(finished, name):
     assert not (finished / "report").is_dir() or (finished / "report").is_symlink()
 
 
-def test_a_run_writes_through_no_link(suite):
+def test_a_verb_writes_through_no_link(suite):
     put(suite.root / "theirs")
     words = ("run", suite.root / "suite.yaml", "--out", suite.out)
     invoked(*words, "--no-report")
@@ -239,6 +239,11 @@ def test_a_run_writes_through_no_link(suite):
     with pytest.raises(StoreError, match=r"calls\.jsonl: is a link"):
         invoked(*words)
     assert (suite.root / "theirs").read_text() == "mine"
+    (suite.root / "new").mkdir()
+    (suite.root / "new" / "models.yaml").symlink_to(suite.root / "elsewhere.yaml")
+    with pytest.raises(StoreError, match=r"models\.yaml: is already there"):
+        invoked("init", suite.root / "new")
+    assert not (suite.root / "elsewhere.yaml").exists()
 
 
 WRITING: dict[str, tuple[tuple[str, ...], str, str]] = {
@@ -307,14 +312,6 @@ def test_reports_that_are_written_at_once_all_come_to_their_end(finished):
     (build,) = (path for path in (finished / "report").iterdir())
     assert {path.name for path in build.iterdir()} >= {"samples.js", "records-0.js"}
     assert f"report/{build.name}" in pages[0].read_text(encoding="utf-8")
-
-
-def test_init_writes_through_no_link(tmp_path):
-    (tmp_path / "new").mkdir()
-    (tmp_path / "new" / "models.yaml").symlink_to(tmp_path / "elsewhere.yaml")
-    with pytest.raises(StoreError, match=r"models\.yaml: is already there"):
-        invoked("init", tmp_path / "new")
-    assert not (tmp_path / "elsewhere.yaml").exists()
 
 
 def test_a_run_goes_on_only_where_its_report_can_be_written(suite):

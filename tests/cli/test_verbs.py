@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import subprocess
 import sys
@@ -14,7 +15,7 @@ from PIL import Image
 
 from phyblock.cli.main import phyblock
 from phyblock.config.models import ModelConfig
-from phyblock.data.scenes import read_builtin
+from phyblock.data.scenes import StoredScene, read_builtin
 from phyblock.errors import SpecError, StoreError
 from phyblock.models import litellm_client
 from phyblock.models.litellm_client import known_providers
@@ -23,6 +24,7 @@ from phyblock.sim.engine import ENGINES
 from phyblock.tracks.step_planning import StepPlanning
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
+from tests.tracks.conftest import seesaw
 from tests.web.factory import LEVELS, manifest, record, score, write_run
 from tests.workspace import Workspace, questions, vqa_suite, write_questions
 
@@ -61,15 +63,12 @@ def test_importing_what_a_program_needs_imports_nothing_heavy(modules, heavy):
     assert not imported & {*heavy, *LIBRARIES, "aiohttp"}
 
 
-def test_help_names_every_verb_and_imports_nothing_heavy():
+def test_help_and_version_import_nothing_heavy():
     told, imported = ran(COMMANDS, "--help")
     for verb in VERBS:
         assert f"\n  {verb} " in told
     assert "phyblock run quick" in told
     assert not imported & {*HEAVY, "numpy", "pydantic", "rich", "yaml"}
-
-
-def test_help_of_verbs_and_version_import_nothing_heavy():
     verbs = ("run", "report", "score", "validate", "models", "cache", "init")
     told, imported = ran(COMMANDS, "--version", *(f"{verb} --help" for verb in verbs))
     assert told.startswith("phyblock, version ")
@@ -143,31 +142,14 @@ def test_a_model_at_hand_needs_no_litellm(model, monkeypatch):
 
 REPORT = StepPlanning.report()
 
-SEESAW = {
-    "id": "seesaw",
-    "levels": [2],
-    "parents": ["seesaw"],
-    "blocks": [
-        *(
-            {"order": n, "type": "cube", "color": color, "layer": 1, "depend": [0],
-             "position": [x, 0, 0.025], "euler": [0, 0, 0]}
-            for n, color, x in ((1, "red", 0), (2, "blue", 0.11))
-        ),
-        {"order": 3, "type": "cuboid3", "color": "yellow", "layer": 2, "depend": [1],
-         "position": [0.055, 0, 0.0625], "euler": [0, 0, 0]},
-    ],
-    "candidates": [
-        {"type": t, "color": c, "euler": [0, 0, 0], "required": 1}
-        for t, c in (("cube", "red"), ("cube", "blue"), ("cuboid3", "yellow"))
-    ],
-}  # fmt: skip
-
 
 @pytest.fixture(scope="module")
 def played(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Workspace:
     """A run of oracle and repeat; in some of eight seeds the oracle lets the bar fall."""
     workspace = Workspace(tmp_path_factory.mktemp("played"), pictures_dir)
-    workspace.write_scenes(SEESAW)
+    tipping = seesaw()
+    scene = StoredScene.of(tipping.scene, tipping.candidates).as_json()
+    workspace.write_scenes(json.loads(scene))
     workspace.write_suite(
         tracks=["step_planning"],
         models=["oracle", "repeat"],

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from phyblock.data.base import Dataset, QuestionTask
 from phyblock.data.questions import read_questions
 from phyblock.data.scenes import read_builtin
-from phyblock.domain.question import Mark, QuestionPicture
+from phyblock.domain.question import Mark
 from phyblock.domain.scene import Block
 from phyblock.errors import DataError
 from tests.data.broken import sound_scene, without, write_scenes
@@ -50,16 +50,6 @@ def read_one(folder: Path, scenes: Dataset, question: Any) -> QuestionTask:
     return task
 
 
-def test_a_sound_question_is_read(tmp_path, scenes):
-    task = read_one(tmp_path / "q", scenes, QUESTION)
-    question = task.question
-    assert (task.key, question.answer, question.answer_letters) == ("co-001", (1,), "B")
-    assert [block.color for block in task.scene.blocks] == ["blue", "red"]
-    assert question.pictures == (QuestionPicture("scene", task.scene.blocks, (45.0, 22.0)),)
-    assert question.category == "object_property"
-    assert not task.files
-
-
 def test_a_picture_is_the_scene_but_for_what_its_recipe_says(tmp_path, scenes):
     added = sound_scene()["blocks"][0] | {"order": 9, "position": [0.2, 0, 0.025]}
     recipe = {
@@ -82,14 +72,6 @@ def test_a_picture_is_the_scene_but_for_what_its_recipe_says(tmp_path, scenes):
     )
     assert picture.marks == (Mark("A", (0, 0, 0.1)),)
     assert picture.framed == task.scene.blocks
-
-
-def test_an_order_is_read_as_four_indices(tmp_path, scenes):
-    pictures = [{"label": letter, "view": [45, 22]} for letter in "ABCD"]
-    options = [f"<img{i}>" for i in range(1, 5)]
-    changes = {"subtask": "OR", "category": "dynamic_reasoning", "options": options}
-    question = QUESTION | changes | {"answer": "BADC", "pictures": pictures}
-    assert read_one(tmp_path / "q", scenes, question).question.answer == (1, 0, 3, 2)
 
 
 PICTURE_OPTIONS = ["<img1>", "<img2>", "<img3>", "<img4>"]

@@ -39,23 +39,6 @@ def problems_of(folder: Path) -> tuple[Problem, ...]:
     return caught.value.problems
 
 
-def test_a_sound_scene_is_read(tmp_path):
-    dataset = read_builtin(write_scenes(tmp_path, SCENE))
-    (task,) = dataset.tasks
-    assert dataset.name == tmp_path.name
-    assert task.composite is None
-    assert task.scene == Scene(
-        "s1",
-        (1, 2),
-        (
-            Block(1, "cube", "red", (0, 0, 0.025), (0, 0, 0), (), 1),
-            Block(2, "arch", "red", (0, 0, 0.075), (0, 0, 90), (1,), 2),
-        ),
-        ("s1",),
-    )
-    assert task.candidates[3] == Candidate("arch", "red", (0, 0, 90))
-
-
 def test_scenes_come_in_id_order_whatever_their_lines(tmp_path):
     scenes = [{**SCENE, "id": name} for name in ("c", "a", "b")]
     dataset = read_builtin(write_scenes(tmp_path, *scenes))

@@ -191,20 +191,14 @@ def test_ranks_are_what_the_pairs_allow(n, data):
         assert (ranks[:, 0] == ranks[:, 1]).all()
 
 
-def test_no_interval_comes_from_a_single_base_scene():
-    found = jackknife([[1, 1, 0]] * 4, Clusters.of([["a"]] * 4), f1_of)
-    assert found.value == pytest.approx(2 / 3)
-    assert all(np.isnan([found.se, found.lo, found.hi, found.p]))
-    assert found.n_clusters == 1
-
-
-def test_nothing_measured_is_no_value():
-    found = jackknife(np.zeros((0, 2, 3)), Clusters.of([]), f1_of)
-    assert found.value.shape == (2,)
-    assert np.isnan([found.value, found.se, found.lo, found.hi, found.p]).all()
-
-
-def test_a_unit_without_a_base_scene_is_refused():
+def test_where_nothing_was_measured_or_all_in_one_base_scene_there_is_no_interval():
+    alone_in_one = jackknife([[1, 1, 0]] * 4, Clusters.of([["a"]] * 4), f1_of)
+    assert (alone_in_one.value, alone_in_one.n_clusters) == (pytest.approx(2 / 3), 1)
+    nothing = jackknife(np.zeros((0, 2, 3)), Clusters.of([]), f1_of)
+    assert nothing.value.shape == (2,)
+    assert np.isnan(nothing.value).all()
+    for found in (alone_in_one, nothing):
+        assert np.isnan([found.se, found.lo, found.hi, found.p]).all()
     with pytest.raises(ValueError, match="needs a base scene"):
         Clusters.of([["a"], []])
 
