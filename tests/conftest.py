@@ -1,7 +1,5 @@
 """Shared fixtures: where the official data is, if it is here; workspaces."""
 
-from __future__ import annotations
-
 import gc
 import os
 import signal

@@ -5,8 +5,6 @@
 The documentation makes its tables of fields from them; a test compares them with the models.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path

@@ -9,8 +9,6 @@ each model in the headline tables; models, measures and columns that a run adds 
 Requests are compared by a digest of all bodies that a local server received.
 """
 
-from __future__ import annotations
-
 import argparse
 import hashlib
 import json

@@ -1,7 +1,5 @@
 """Data that many tests look at, each read once: what comes with the project, official data."""
 
-from __future__ import annotations
-
 import functools
 import json
 from pathlib import Path

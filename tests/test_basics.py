@@ -1,7 +1,5 @@
 """Root modules: texts that steer nothing, sums that are alike, worker processes."""
 
-from __future__ import annotations
-
 import builtins
 import functools
 import math

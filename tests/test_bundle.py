@@ -1,7 +1,5 @@
 """A bundle of a run: scored again elsewhere it says the same; changed, it is refused."""
 
-from __future__ import annotations
-
 import io
 import json
 import re

@@ -1,7 +1,5 @@
 """Files are read within bounds, written whole, and never over what the user made."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import json

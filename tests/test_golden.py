@@ -1,7 +1,5 @@
 """Golden runs are what they were; see tests/golden.py."""
 
-from __future__ import annotations
-
 import json
 
 import pytest

@@ -1,7 +1,5 @@
 """Dependencies are declared, pinned with hashes, and licensed."""
 
-from __future__ import annotations
-
 import ast
 import re
 import subprocess

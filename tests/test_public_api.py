@@ -1,7 +1,5 @@
 """The public API: names, costs, the guide to it, and tasks, one by one, in any thread."""
 
-from __future__ import annotations
-
 import asyncio
 import itertools
 import pickle

@@ -1,7 +1,5 @@
 """Bad input gives exit code 2 and one clear message a problem, and nothing on disk is lost."""
 
-from __future__ import annotations
-
 import io
 import json
 import os

@@ -1,7 +1,5 @@
 """A terminal or a log shows tables of any width, names that others chose, and progress."""
 
-from __future__ import annotations
-
 import csv
 import io
 import itertools

@@ -1,7 +1,5 @@
 """What users bring: prompts beside the suite, modules that add to tracks."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

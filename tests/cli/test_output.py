@@ -1,7 +1,5 @@
 """Output of commands: on pipes and in terminals, and never over what is the user's."""
 
-from __future__ import annotations
-
 import os
 import pty
 import re

@@ -1,7 +1,5 @@
 """Verbs as they are called: help, `models`, `show`, and those that read a finished run."""
 
-from __future__ import annotations
-
 import json
 import re
 import subprocess

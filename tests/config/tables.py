@@ -1,7 +1,5 @@
 """Bad files, and what is said of them: the tables `bad_suites.yaml` and `bad_models.yaml`."""
 
-from __future__ import annotations
-
 import json
 import os
 import tempfile

@@ -1,7 +1,5 @@
 """Models files: each bad one is told in words at its place; secrets, addresses, groups."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The suites, the models file and the JSON Schemas that come with the project."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os

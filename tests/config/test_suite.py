@@ -1,7 +1,5 @@
 """Suites: each bad one is told in words at its place; laws of those that are sound."""
 
-from __future__ import annotations
-
 import contextlib
 import copy
 import json

@@ -1,7 +1,5 @@
 """Reading YAML: what scalars mean, where things stand, what is refused."""
 
-from __future__ import annotations
-
 import json
 import os
 

@@ -2,8 +2,6 @@
 line, and ways in which a hand or a disk damages it.
 """
 
-from __future__ import annotations
-
 import copy
 import json
 from collections.abc import Sequence

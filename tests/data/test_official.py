@@ -1,7 +1,5 @@
 """The official layout: its scenes, its recordings, question files, and the names of its models."""
 
-from __future__ import annotations
-
 import json
 import os
 from collections import Counter

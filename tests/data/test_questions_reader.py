@@ -1,7 +1,5 @@
 """The reader of questions: what is sound reads back, what is broken is named with its line."""
 
-from __future__ import annotations
-
 import contextlib
 import copy
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The reader of scenes: what is sound reads back, what is broken is named in few words."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os

@@ -1,7 +1,5 @@
 """What the documentation says is done: tutorials from an empty folder, plugins, models."""
 
-from __future__ import annotations
-
 import base64
 import os
 import re

@@ -2,8 +2,6 @@
 candidate sets; laws of the AOV graph.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 

@@ -1,7 +1,5 @@
 """The Gymnasium environment: its interface, its rules, its pictures."""
 
-from __future__ import annotations
-
 import io
 import re
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Two prepared folders for all fuzzing, and a summary of what was tried."""
 
-from __future__ import annotations
-
 from collections import Counter
 from pathlib import Path
 

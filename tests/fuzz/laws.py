@@ -6,8 +6,6 @@
    what was refused for good is not asked again either, unless it is told to. What failed may be.
 """
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import json

@@ -7,8 +7,6 @@ A law about them holds for whatever they give: exit code 0 or 2, and never a tra
 and the seed of fuzzing are set by environment variables, as `make fuzz` does.
 """
 
-from __future__ import annotations
-
 import io
 import json
 import os

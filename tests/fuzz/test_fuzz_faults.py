@@ -2,8 +2,6 @@
 batches under faults and kills; costs under whatever usage is reported.
 """
 
-from __future__ import annotations
-
 import asyncio
 import json
 import math

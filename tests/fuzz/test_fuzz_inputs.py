@@ -3,8 +3,6 @@
 Each kind of case puts a bad file, argument or folder before a command.
 """
 
-from __future__ import annotations
-
 import json
 from collections import Counter
 from collections.abc import Sequence

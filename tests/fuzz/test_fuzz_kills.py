@@ -3,8 +3,6 @@ back: nothing answered is lost, and of what was answered no more is asked again 
 when a kill or a death came; what was billed is known, and records are those of a quiet run.
 """
 
-from __future__ import annotations
-
 import contextlib
 import json
 import random

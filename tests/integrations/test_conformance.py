@@ -3,8 +3,6 @@
 A framework that is not installed is skipped; docs/integrations.md says how each is installed.
 """
 
-from __future__ import annotations
-
 import asyncio
 import itertools
 import json

@@ -1,7 +1,5 @@
 """Checks of scenes: each finds its own fault, in the same words for makers, verifiers, auditors."""
 
-from __future__ import annotations
-
 import shutil
 from dataclasses import replace
 

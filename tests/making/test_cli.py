@@ -1,7 +1,5 @@
 """The verbs of `phyblock scenes` and `phyblock questions` as a person calls them."""
 
-from __future__ import annotations
-
 import importlib.util
 import io
 import os

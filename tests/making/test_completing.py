@@ -1,7 +1,5 @@
 """`phyblock scenes complete`: positions become a data set, or are refused with the reason."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Rules by which questions are drafted and answers derived: names, lengths, places, ranks."""
 
-from __future__ import annotations
-
 import itertools
 from collections import Counter
 from collections.abc import Iterator

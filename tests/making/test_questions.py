@@ -1,7 +1,5 @@
 """Questions of all subtasks: sound, even, derived again, found when spoiled; the built-in set."""
 
-from __future__ import annotations
-
 import hashlib
 import itertools
 from collections import Counter

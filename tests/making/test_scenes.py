@@ -1,7 +1,5 @@
 """Sketches, designs, the grammar and the production of scenes: sound, varied, the same again."""
 
-from __future__ import annotations
-
 import functools
 from dataclasses import replace
 from itertools import islice

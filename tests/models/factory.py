@@ -2,8 +2,6 @@
 models in batches without a run around them: a list for the disk, and kills.
 """
 
-from __future__ import annotations
-
 import asyncio
 import itertools
 import threading

@@ -1,7 +1,5 @@
 """Batches: every question gets what a call of its own would have got, once, whatever happens."""
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import itertools

@@ -1,7 +1,5 @@
 """The reply cache: what its key holds, what it keeps, and what may happen to its file."""
 
-from __future__ import annotations
-
 import os
 import signal
 import sqlite3

@@ -1,7 +1,5 @@
 """Prices, estimates and the budget."""
 
-from __future__ import annotations
-
 import asyncio
 import functools
 

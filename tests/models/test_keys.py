@@ -1,7 +1,5 @@
 """Keys: the one that a model needs, and that keys stay out of all text."""
 
-from __future__ import annotations
-
 import base64
 import html
 import json

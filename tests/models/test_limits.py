@@ -1,7 +1,5 @@
 """Limits, retries and cancellations: when a request is sent, how often, and when no more."""
 
-from __future__ import annotations
-
 import asyncio
 import heapq
 import itertools

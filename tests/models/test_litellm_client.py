@@ -1,7 +1,5 @@
 """Calls through litellm: over our HTTP client or not at all, and its settings stay as they are."""
 
-from __future__ import annotations
-
 import contextlib
 import logging
 import os

@@ -1,7 +1,5 @@
 """Recorded replies in the place of a model."""
 
-from __future__ import annotations
-
 import asyncio
 import json
 import re

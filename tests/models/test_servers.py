@@ -1,7 +1,5 @@
 """The servers of a model: the load is even, outages lose nothing and cost few attempts."""
 
-from __future__ import annotations
-
 import asyncio
 from collections import Counter
 

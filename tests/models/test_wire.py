@@ -2,8 +2,6 @@
 and what comes of each way in which it can end a call.
 """
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import json

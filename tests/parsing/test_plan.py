@@ -2,8 +2,6 @@
 of readings of the official recordings.
 """
 
-from __future__ import annotations
-
 import json
 from collections import Counter
 from pathlib import Path

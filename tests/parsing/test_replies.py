@@ -1,7 +1,5 @@
 """Replies of every form but plans: tables with what they say, and laws of every reader."""
 
-from __future__ import annotations
-
 import json
 import time
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Lines of data and of records: written again as they are, refused where they are damaged."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os

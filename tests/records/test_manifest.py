@@ -1,7 +1,5 @@
 """`run.yaml` is read within bounds; only a run's own records are counted, and go on in it."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Callable
 from pathlib import Path

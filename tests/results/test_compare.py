@@ -1,7 +1,5 @@
 """Comparisons of models and runs, and the effect of the presentation."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

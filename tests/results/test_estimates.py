@@ -1,7 +1,5 @@
 """What a run is loaded as, and estimates of every track: laws, and numbers counted by hand."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections import defaultdict

@@ -1,7 +1,5 @@
 """Runs and questions in the formats of other tools, as these read them."""
 
-from __future__ import annotations
-
 import ast
 import base64
 import csv

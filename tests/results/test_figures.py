@@ -1,7 +1,5 @@
 """Figures: drawn from estimates, the same bytes each time, with captions that LaTeX reads."""
 
-from __future__ import annotations
-
 import pytest
 
 from phyblock.results.estimates import Headline

@@ -1,7 +1,5 @@
 """Tables: each number is that of an estimate, and files that appear whole or not at all."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 from typing import Any

@@ -1,7 +1,5 @@
 """Whole runs whose models are asked in batches: stopped, killed and resumed by the same command."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import re

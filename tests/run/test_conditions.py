@@ -1,7 +1,5 @@
 """Whole runs that ask in other ways: shuffled, blind, with another goal, and varied."""
 
-from __future__ import annotations
-
 import hashlib
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Costs of a run: expected by a dry run as providers bill, and never above max_cost_usd."""
 
-from __future__ import annotations
-
 import io
 import json
 import re

@@ -1,7 +1,5 @@
 """Failures of a provider and of the reply cache: retried, recorded by kind, said once."""
 
-from __future__ import annotations
-
 import contextlib
 import re
 import signal

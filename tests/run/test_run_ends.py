@@ -1,7 +1,5 @@
 """Runs that end before their time, by Ctrl-C, a kill or a mistake of ours: all answers are kept."""
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import os

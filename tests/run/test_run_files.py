@@ -1,7 +1,5 @@
 """The files of a run folder: appended whole, read whole, each prompt once."""
 
-from __future__ import annotations
-
 import errno
 import hashlib
 import json

@@ -1,7 +1,5 @@
 """Laws of runs: what must not matter does not, what is stored is enough, one process a folder."""
 
-from __future__ import annotations
-
 import json
 import random
 import shutil

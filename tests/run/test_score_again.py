@@ -1,7 +1,5 @@
 """A run that another version of phyblock judged: refused until it is scored, then gone on with."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import sys

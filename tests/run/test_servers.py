@@ -1,7 +1,5 @@
 """Servers: where one is decides nothing, and no key or picture that it says again is kept."""
 
-from __future__ import annotations
-
 import base64
 
 import pytest

@@ -1,7 +1,5 @@
 """Whole runs of questions and of episodes, and of all tracks that ask for JSON."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import re

@@ -2,8 +2,6 @@
 worlds of scenes in which the true F1 is known.
 """
 
-from __future__ import annotations
-
 import functools
 from dataclasses import dataclass, replace
 

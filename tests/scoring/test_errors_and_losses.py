@@ -1,7 +1,5 @@
 """Wrong steps and lost goal blocks: one type for each, and the right one."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Official and bundled data: known counts, valid orders, averages as they are published."""
 
-from __future__ import annotations
-
 import math
 import random
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Plans: matchers, Level-1 criteria and ratios, against plain re-implementations."""
 
-from __future__ import annotations
-
 from fractions import Fraction
 
 import numpy as np

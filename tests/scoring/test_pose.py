@@ -1,7 +1,5 @@
 """Laws of setting C: whom steps stand for, the two frames, and what cannot matter."""
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Uncertainty: intervals, tests, ranks and variance components, and how often they are right."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The rule of a step: what a move does to an assembly."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

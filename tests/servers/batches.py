@@ -4,8 +4,6 @@ break off.
 A batch answers each of its requests as the server would answer it alone, and counts it as asked.
 """
 
-from __future__ import annotations
-
 import itertools
 import json
 import time

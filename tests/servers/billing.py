@@ -7,8 +7,6 @@ public vocabulary o200k and, of its cookbook, three tokens a message and three f
 Anthropic by the vocabulary that litellm carries of it; Google by four characters a token.
 """
 
-from __future__ import annotations
-
 import base64
 import functools
 import importlib.util

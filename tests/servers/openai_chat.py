@@ -1,7 +1,5 @@
 """A server that speaks the OpenAI chat protocol: `python -m tests.servers.openai_chat --port 0`."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import json

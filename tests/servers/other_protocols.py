@@ -1,7 +1,5 @@
 """Servers that speak the Anthropic Messages protocol, and the Gemini generateContent protocol."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 from typing import Any

@@ -1,7 +1,5 @@
 """Blocks and small structures, some of them designed by hand, that tests look at closely."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

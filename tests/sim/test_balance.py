@@ -1,7 +1,5 @@
 """Balance by statics: by hand, against simulations, and with proofs that nothing changed passes."""
 
-from __future__ import annotations
-
 import ast
 import math
 import sys

@@ -1,7 +1,5 @@
 """Blocks let go: worlds, trials, building steps, states of a structure, removals and pushes."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """Laws of every physics engine that is installed, and of plans executed in it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Geometry: the blocks themselves, and blocks in contact."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Pictures: cameras that cut nothing off, blocks that stand out, the same bytes for one recipe."""
 
-from __future__ import annotations
-
 import hashlib
 import io
 import itertools

@@ -1,7 +1,5 @@
 """The rasterizer against rays: what shows where, how bright it is, and what lies in shadow."""
 
-from __future__ import annotations
-
 import ast
 import hashlib
 from concurrent.futures import ThreadPoolExecutor

@@ -1,7 +1,5 @@
 """Tracks opened for tests on a suite of some fields; scenes, and who draws their pictures."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path

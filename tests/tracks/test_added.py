@@ -1,7 +1,5 @@
 """Measures and tracks that are added in one place; names and counts that clash are refused."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -1,7 +1,5 @@
 """Answers without a model: guesses of questions, plans without the goal, picks of people."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """The full-planning track: what is asked, and what a reply is worth."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 from types import SimpleNamespace

@@ -1,7 +1,5 @@
 """Items: those that are asked about, how difficult they are, and how a seed presents them."""
 
-from __future__ import annotations
-
 import asyncio
 import math
 from itertools import pairwise, permutations

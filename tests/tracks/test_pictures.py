@@ -1,7 +1,5 @@
 """Pictures of samples: drawn once, in the layout asked for, kept by content."""
 
-from __future__ import annotations
-
 import asyncio
 import io
 from collections.abc import Sequence

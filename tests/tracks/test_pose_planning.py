@@ -1,7 +1,5 @@
 """Pose planning: what a reply is worth in three settings, and a run of it from YAML to the page."""
 
-from __future__ import annotations
-
 import asyncio
 import functools
 import shutil

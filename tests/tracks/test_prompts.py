@@ -1,7 +1,5 @@
 """Prompts: blocks become messages, files are included, faults are named, nothing is given away."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 from pathlib import Path

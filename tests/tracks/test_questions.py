@@ -1,7 +1,5 @@
 """The track of questions: selection, what is sent in which order, judging, baselines."""
 
-from __future__ import annotations
-
 import itertools
 from collections import Counter
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Step planning: what each reply does, what ends an episode, what is recorded and what is asked."""
 
-from __future__ import annotations
-
 import asyncio
 import functools
 import json

@@ -1,7 +1,5 @@
 """Manifests and records for the tests of tables."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The data of pages: what is packed comes back, headlines are those of tables, runs agree."""
 
-from __future__ import annotations
-
 import base64
 import json
 import math

@@ -1,7 +1,5 @@
 """A session of a person: what it shows and keeps, the server that refuses others."""
 
-from __future__ import annotations
-
 import asyncio
 import http.client
 import json
