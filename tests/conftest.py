@@ -4,14 +4,15 @@ import gc
 import os
 import signal
 import sys
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
 
+from phyblock.data.base import Dataset
 from tests.fork_server import ONE_THREAD, end_fork_server
-from tests.workspace import KEY, KEY_VARIABLE, Workspace
+from tests.workspace import KEY, KEY_VARIABLE, Raw, Workspace
 
 OFFICIAL_MISSING = (
     "official PhyBlock data not found: put it at ../shared or set PHYBLOCK_OFFICIAL to the folder "
@@ -86,6 +87,28 @@ def pictures_dir(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of rendered pictures of all workspaces of a test session, in all its processes."""
     base = tmp_path_factory.getbasetemp()
     return (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "pictures"
+
+
+@pytest.fixture(scope="session")
+def new_workspace(
+    tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path
+) -> Callable[..., Workspace]:
+    """Makes workspaces with some scenes, for what is made once and looked at by many tests."""
+
+    def make(*scenes: Raw) -> Workspace:
+        made = Workspace(tmp_path_factory.mktemp("made"), pictures_dir)
+        made.write_scenes(*scenes)
+        return made
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def towers(new_workspace: Callable[..., Workspace]) -> Dataset:
+    """The scenes of a workspace, as they are read."""
+    from phyblock.data.scenes import read_builtin
+
+    return read_builtin(new_workspace().root / "data")
 
 
 @pytest.fixture

@@ -35,10 +35,9 @@ Change = Callable[[list[Raw], Raw], None]
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Workspace:
+def made(new_workspace: Callable[..., Workspace]) -> Workspace:
     """A model and a baseline in three tracks, and the bundle of the run beside it."""
-    workspace = Workspace(tmp_path_factory.mktemp("bundled"), pictures_dir)
-    workspace.write_scenes(*SCENES[:3])
+    workspace = new_workspace(*SCENES[:3])
     write_questions(workspace.root / "questions", questions(per_subtask=2, subtasks=SUBTASKS))
     workspace.write_suite(
         tracks=["full_planning", "vqa", "step_planning"],

@@ -57,19 +57,14 @@ def pins(lock: str) -> set[str]:
     return {pin if several[pin.partition("==")[0]] > 1 else pin.split(" ;")[0] for pin in whole}
 
 
-def test_what_runs_need_is_pinned_alike_for_tests():
+def test_lock_files_agree_and_are_installed_with_their_hashes():
     """In one version, tests may have it on more Pythons: an extra brings it there, too."""
     runs, tests = map(pins, LOCKS)
     assert runs <= tests
-
-
-def test_both_lock_files_are_installed_with_their_hashes():
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     for lock in LOCKS:
         assert f"$(PIP) --require-hashes --requirement {lock}" in makefile
-
-
-def test_litellm_ends_below_its_next_major_version():
+    # litellm ends below its next major version.
     assert declared()["litellm"] == ">=1.83.10,!=1.82.7,!=1.82.8,<2"
 
 

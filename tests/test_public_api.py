@@ -57,8 +57,11 @@ def test_the_guide_runs_and_every_object_shows_itself(tmp_path, monkeypatch, cap
 
 def test_what_is_wrong_is_named():
     suite = phyblock.load_suite("quick", "limit=2")
-    scene = phyblock.tasks("full_planning", limit=1)[0].item
-    wrong: dict[str, typing.Callable[[], object]] = {
+    finite = phyblock.tasks("full_planning", limit=1)
+    stream = phyblock.tasks("full_planning", split="train")
+    playing = phyblock.tasks("step_planning", limit=1)[0]
+    scene, other = finite[0].item, finite[0].track.dataset.tasks[0]
+    wrong: dict[str, Callable[[], object]] = {
         "there is no such suite": lambda: phyblock.load_suite("quik"),
         "load_suite: suite: is too short": lambda: phyblock.load_suite(""),
         "--set limit=0": lambda: phyblock.load_suite("quick", "limit=0"),
@@ -84,6 +87,18 @@ def test_what_is_wrong_is_named():
         "render: size_px": lambda: phyblock.render(scene, size_px=128.5),
         "render: view": lambda: phyblock.render(scene, view=["front"]),
         "load_suite: overrides": lambda: phyblock.load_suite("quick", 5),
+        "first: is the place": lambda: phyblock.tasks("full_planning", first=1),
+        "found: 2": lambda: phyblock.tasks("full_planning", split="dev", limit=1, first=2),
+        "data: is not a data set": lambda: phyblock.tasks("full_planning", data=5),
+        "data[0]: is not a scene": lambda: phyblock.tasks("full_planning", data=[1]),
+        "data[1]: comes a second": lambda: phyblock.tasks("full_planning", data=[other, other]),
+        "tracks: does not go": lambda: phyblock.tasks("full_planning", "tracks=[vqa]"),
+        'split="test", vqa.path': lambda: phyblock.tasks("vqa", split="train"),
+        "takes texts": lambda: playing.episode().step(None),
+        "reply: cannot be scored": lambda: playing.score(5),
+        "by place": lambda: stream[:2],
+        "found: -1": lambda: stream[-1],
+        "found: None": lambda: finite[None],
     }
     for said, call in wrong.items():
         with pytest.raises(SpecError, match=re.escape(said)):
@@ -214,30 +229,6 @@ def test_finite_sets_hold_each_scene_once_and_have_slices():
     assert [one.key for one in finite[1:]] == [finite[1].key, finite[2].key]
     with pytest.raises(SpecError, match="give 1 scenes"):
         _distinct(itertools.repeat(finite[0].track.dataset.tasks[0]), 2)
-
-
-def test_what_is_wrong_with_tasks_and_replies_is_named():
-    finite = phyblock.tasks("full_planning", limit=1)
-    stream = phyblock.tasks("full_planning", split="train")
-    scene = finite[0].track.dataset.tasks[0]
-    steps = phyblock.tasks("step_planning", limit=1)[0]
-    wrong: dict[str, Callable[[], object]] = {
-        "first: is the place": lambda: phyblock.tasks("full_planning", first=1),
-        "found: 2": lambda: phyblock.tasks("full_planning", split="dev", limit=1, first=2),
-        "data: is not a data set": lambda: phyblock.tasks("full_planning", data=5),
-        "data[0]: is not a scene": lambda: phyblock.tasks("full_planning", data=[1]),
-        "data[1]: comes a second": lambda: phyblock.tasks("full_planning", data=[scene, scene]),
-        "tracks: does not go": lambda: phyblock.tasks("full_planning", "tracks=[vqa]"),
-        'split="test", vqa.path': lambda: phyblock.tasks("vqa", split="train"),
-        "takes texts": lambda: steps.episode().step(None),
-        "reply: cannot be scored": lambda: steps.score(5),
-        "by place": lambda: stream[:2],
-        "found: -1": lambda: stream[-1],
-        "found: None": lambda: finite[None],
-    }
-    for said, call in wrong.items():
-        with pytest.raises(SpecError, match=re.escape(said)):
-            call()
 
 
 def test_answers_can_be_asked_for_as_json():

@@ -507,10 +507,9 @@ BAD: tuple[Bad, ...] = SUITES + OPTIONS + DATA + MODELS + FOLDERS + CACHES
 
 
 @pytest.fixture(scope="module")
-def finished(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Workspace:
+def finished(new_workspace: Callable[..., Workspace]) -> Workspace:
     """A workspace with a finished run in `out`, replies in the cache, and a server that is gone."""
-    made = Workspace(tmp_path_factory.mktemp("finished"), pictures_dir)
-    made.write_scenes()
+    made = new_workspace()
     made.write_suite(models=["random", "alpha"])
     (made.root / "low").mkdir()
     (made.write_scenes(tower("t1", [1, 2], ("red",))) / "scenes.jsonl").rename(

@@ -17,8 +17,7 @@ def asked(workspace: Workspace) -> Workspace:
 
 
 def own_prompt(workspace: Workspace) -> Path:
-    path: Path = workspace.root / "prompts" / "full_planning.j2"
-    return path
+    return workspace.root / "prompts" / "full_planning.j2"
 
 
 def test_a_prompt_beside_the_suite_is_used_and_said(asked):

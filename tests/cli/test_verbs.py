@@ -4,6 +4,7 @@ import json
 import re
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import click
@@ -142,12 +143,11 @@ REPORT = StepPlanning.report()
 
 
 @pytest.fixture(scope="module")
-def played(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Workspace:
+def played(new_workspace: Callable[..., Workspace]) -> Workspace:
     """A run of oracle and repeat; in some of eight seeds the oracle lets the bar fall."""
-    workspace = Workspace(tmp_path_factory.mktemp("played"), pictures_dir)
     tipping = seesaw()
     scene = StoredScene.of(tipping.scene, tipping.candidates).as_json()
-    workspace.write_scenes(json.loads(scene))
+    workspace = new_workspace(json.loads(scene))
     workspace.write_suite(
         tracks=["step_planning"],
         models=["oracle", "repeat"],

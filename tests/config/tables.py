@@ -17,8 +17,7 @@ from phyblock.errors import SpecError
 def table(name: str) -> list[dict[str, Any]]:
     """The entries of a table."""
     text = Path(__file__).with_name(name).read_text(encoding="utf-8")
-    entries: list[dict[str, Any]] = yaml.safe_load(text)
-    return entries
+    return yaml.safe_load(text)
 
 
 def told(folder: Path, kind: str, text: str, sets: Sequence[str] = ()) -> str:

@@ -121,13 +121,9 @@ def test_names_and_groups_stand_for_models_in_the_order_of_the_file(tmp_path):
 
 
 SECRETS = [
-    "sk-proj-Abcdefghijkl1234567890",
-    "sk-ant-api03-Abcdefghijkl1234567890",
-    "AIzaSyAbcdefghijklmnopqrstuvwxyz0123456",
-    "gsk_Abcdefghijklmnopqrstuvwx",
-    "hf_Abcdefghijklmnopqrstuvwx",
-    "xai-Abcdefghijklmnopqrstuvwx",
-    "AKIAABCDEFGHIJKLMNOP",
+    *("sk-proj-Abcdefghijkl1234567890", "sk-ant-api03-Abcdefghijkl1234567890"),
+    *("AIzaSyAbcdefghijklmnopqrstuvwxyz0123456", "gsk_Abcdefghijklmnopqrstuvwx"),
+    *("hf_Abcdefghijklmnopqrstuvwx", "xai-Abcdefghijklmnopqrstuvwx", "AKIAABCDEFGHIJKLMNOP"),
     "Bearer abcdefgh12345678",
 ]
 PLACES = [
@@ -177,24 +173,10 @@ SECRETIVE = [
     f"http://[::1/v1?k={SECRET}",
 ]
 MALFORMED = [
-    "",
-    "localhost:8000",
-    "ftp://host/v1",
-    "http://",
-    "http:///v1",
-    "http://[::1/v1",
-    "http://::1/v1",
-    "http://[1.2.3.4]/v1",
-    "http://host:port/v1",
-    "http://host:99999/v1",
-    "http://host:0/v1",
-    "http://a..b/v1",
-    f"http://{'a' * 64}.example/v1",
-    "http://ho st/v1",
-    "http://host/v1\n",
-    "http://host/\x00",
-    "http://host/\ud800",
-    f"http://host/{'a' * 2_000}",
+    *("", "localhost:8000", "ftp://host/v1", "http://", "http:///v1", "http://[::1/v1"),
+    *("http://::1/v1", "http://[1.2.3.4]/v1", "http://host:port/v1", "http://host:99999/v1"),
+    *("http://host:0/v1", "http://a..b/v1", f"http://{'a' * 64}.example/v1", "http://ho st/v1"),
+    *("http://host/v1\n", "http://host/\x00", "http://host/\ud800", f"http://host/{'a' * 2_000}"),
 ]
 
 

@@ -93,8 +93,7 @@ def lines_before() -> list[bytes]:
 
 def plan_record() -> Raw:
     """The record of a plan."""
-    found: Raw = json.loads(lines_before()[0])
-    return found
+    return json.loads(lines_before()[0])
 
 
 def record_with(at: str, value: object) -> bytes:

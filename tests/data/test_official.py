@@ -24,7 +24,6 @@ from phyblock.data.scenes import read_builtin
 from phyblock.errors import DataError, Problem
 from phyblock.results.paper import published_table
 from tests.data.broken import Raw, sound_scene, with_value, write_checkout, write_scenes
-from tests.workspace import Workspace
 
 SCENE = {**sound_scene(), "levels": [3], "parents": ["s1"]}
 
@@ -74,28 +73,23 @@ def test_what_only_official_files_have_is_read(tmp_path):
     assert (scene.blocks[1].layer, scene.graph.layers) == (5, (1, 2))
 
 
-# name: path in the file, value there, field of the problem, words of the message
-BROKEN_GOALS: dict[str, tuple[str, object, str, str]] = {
-    "level 5": ("level", 5, "level", "out of range"),
-    "combined is a number": ("combined", 80, "combined", "wrong type"),
-    "combined names nothing": ("combined", "_", "combined", "wrong form"),
-    "camera target": ("lookat_pos", [0, 0, "0"], "lookat_pos[2]", "wrong type"),
-    "dangling depend": ("blocks.1.depend", [9], "blocks[1].depend", "names no block"),
-}
-
-
-BROKEN_CANDIDATES: dict[str, tuple[str, object, str, str]] = {
-    "wrong number": ("1.position", 3, "[1].position", "is wrong"),
-    "duplicate look": ("1.euler", [0, 0, -90], "[2]", "looks the same as candidate 2"),
-    "unsolvable": ("0.color", "blue", "candidates", "hold nothing that block 1"),
-}
-
-
-@pytest.mark.parametrize("name", [*BROKEN_GOALS, *BROKEN_CANDIDATES])
-def test_what_is_broken_is_named_with_file_and_field(tmp_path, name):
-    write_checkout(tmp_path, SCENE)
-    file = goal_path(tmp_path) if name in BROKEN_GOALS else candidates_path(tmp_path)
-    path, value, field, message = (BROKEN_GOALS | BROKEN_CANDIDATES)[name]
+@pytest.mark.parametrize(
+    ("file_of", "path", "value", "field", "message"),
+    [
+        (goal_path, "level", 5, "level", "out of range"),
+        (goal_path, "combined", 80, "combined", "wrong type"),
+        (goal_path, "combined", "_", "combined", "wrong form"),
+        (goal_path, "lookat_pos", [0, 0, "0"], "lookat_pos[2]", "wrong type"),
+        (goal_path, "blocks.1.depend", [9], "blocks[1].depend", "names no block"),
+        (candidates_path, "1.position", 3, "[1].position", "is wrong"),
+        (candidates_path, "1.euler", [0, 0, -90], "[2]", "looks the same as candidate 2"),
+        (candidates_path, "0.color", "blue", "candidates", "hold nothing that block 1"),
+    ],
+)
+def test_what_is_broken_is_named_with_file_and_field(
+    tmp_path, file_of, path, value, field, message
+):
+    file = file_of(write_checkout(tmp_path, SCENE))
     change(file, path, value)
     (problem,) = problems_of(tmp_path)
     assert (problem.where, problem.field) == (str(file), field)
@@ -181,12 +175,6 @@ NEXT: Raw = {
 }
 
 
-@pytest.fixture(scope="module")
-def scenes(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
-    root = tmp_path_factory.mktemp("official")
-    return read_builtin(Workspace(root, root / "pictures").write_scenes())
-
-
 def write(folder: Path, name: str, content: Any) -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     text = content if isinstance(content, str) else json.dumps(content, indent=2)
@@ -201,19 +189,19 @@ def draw(folder: Path, *names: str) -> None:
         Image.new("RGB", (8, 8), "red").save(path)
 
 
-def problems(folder: Path, scenes: Dataset) -> list[str]:
+def problems(folder: Path, towers: Dataset) -> list[str]:
     with pytest.raises(DataError) as caught:
-        read_official_questions(folder, scenes)
+        read_official_questions(folder, towers)
     return [str(problem) for problem in caught.value.problems]
 
 
-def test_texts_pictures_and_orders_are_read(tmp_path, scenes):
+def test_texts_pictures_and_orders_are_read(tmp_path, towers):
     write(tmp_path, "color.json", [COLOR, {**COLOR, "id": "mine", "answer": "blue"}])
     write(tmp_path, "PD.json", [NEXT])
     write(tmp_path, "Ordering.json", [{**NEXT, "answer": "CABD"}])
     draw(tmp_path, *(f"pd-001/img{i}.png" for i in range(1, 5)), "t1.png")
     draw(tmp_path, *(f"or-001/img{i}.jpg" for i in range(1, 5)))
-    found = {task.key: task for task in read_official_questions(tmp_path, scenes).tasks}
+    found = {task.key: task for task in read_official_questions(tmp_path, towers).tasks}
     assert {name: task.question.subtask for name, task in found.items()} == {
         "pd-001": "PD", "or-001": "OR", "co-001": "CO", "mine": "CO"
     }  # fmt: skip
@@ -237,9 +225,9 @@ FAULTS = [
 
 
 @pytest.mark.parametrize(("change", "message"), FAULTS)
-def test_each_fault_is_one_error_with_file_and_place(tmp_path, scenes, change, message):
+def test_each_fault_is_one_error_with_file_and_place(tmp_path, towers, change, message):
     write(tmp_path, "CO.json", [COLOR, {**COLOR, **change}])
-    (problem,) = problems(tmp_path, scenes)
+    (problem,) = problems(tmp_path, towers)
     assert problem.startswith(f"{tmp_path / 'CO.json'}[1]: {message}")
 
 
@@ -255,9 +243,9 @@ def test_each_fault_is_one_error_with_file_and_place(tmp_path, scenes, change, m
         ("CO.json", [{**COLOR, "answer": 2}], "has the wrong type"),
     ],
 )
-def test_files_that_are_no_questions_are_said(tmp_path, scenes, name, content, message):
+def test_files_that_are_no_questions_are_said(tmp_path, towers, name, content, message):
     write(tmp_path, name, content)
-    assert any(message in problem for problem in problems(tmp_path, scenes))
+    assert any(message in problem for problem in problems(tmp_path, towers))
 
 
 SPELLINGS = {

@@ -1,7 +1,7 @@
 """Two prepared folders for all fuzzing, and a summary of what was tried."""
 
 from collections import Counter
-from pathlib import Path
+from collections.abc import Callable
 
 import pytest
 
@@ -20,10 +20,9 @@ def tallies() -> dict[str, Counter[str]]:
 
 
 @pytest.fixture(scope="session")
-def sound(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Workspace:
+def sound(new_workspace: Callable[..., Workspace]) -> Workspace:
     """A folder with a sound suite, models, scenes, questions, and files of the user's own."""
-    made = Workspace(tmp_path_factory.mktemp("sound"), pictures_dir)
-    made.write_scenes(*_SCENES)
+    made = new_workspace(*_SCENES)
     made.write_suite(models=["random"])
     write_questions(made.root / "questions", questions(_SCENES, 1, ("SH", "OR")))
     made.write_yaml(
@@ -56,19 +55,15 @@ def ended(sound: Workspace, tmp_path_factory: pytest.TempPathFactory) -> Workspa
 
 
 @pytest.fixture(scope="session")
-def plain_bench(
-    sound: Workspace, pictures_dir: Path, tmp_path_factory: pytest.TempPathFactory
-) -> Bench:
+def plain_bench(sound: Workspace, tmp_path_factory: pytest.TempPathFactory) -> Bench:
     """Tries cases beside a sound suite."""
-    return Bench(sound.root, pictures_dir, tmp_path_factory.mktemp("plain"))
+    return Bench(sound, tmp_path_factory.mktemp("plain"))
 
 
 @pytest.fixture(scope="session")
-def runs_bench(
-    ended: Workspace, pictures_dir: Path, tmp_path_factory: pytest.TempPathFactory
-) -> Bench:
+def runs_bench(ended: Workspace, tmp_path_factory: pytest.TempPathFactory) -> Bench:
     """Tries cases beside finished runs."""
-    return Bench(ended.root, pictures_dir, tmp_path_factory.mktemp("runs"))
+    return Bench(ended, tmp_path_factory.mktemp("runs"))
 
 
 def pytest_report_header() -> str:

@@ -212,14 +212,15 @@ class Case:
 
 
 class Bench:
-    """Tries cases in copies of the folder `template`.
+    """Tries cases in copies of the workspace `template`.
 
     `tally` counts them by exit code, `found` has the laws that were broken, by kind.
     """
 
-    def __init__(self, template: Path, pictures: Path, root: Path) -> None:
-        self._template, self._pictures, self._folder = template, pictures, root / "here"
-        self._places = ("cache", "tmp", *map(str, shared_folders(pictures)))
+    def __init__(self, template: Workspace, root: Path) -> None:
+        self._template, self._folder = template.root, root / "here"
+        self._pictures = (template.cache / "pictures").resolve()
+        self._places = ("cache", "tmp", *map(str, shared_folders(self._pictures)))
         self.tally: Counter[str] = Counter()
         self.found: dict[str, tuple[Case, Broken]] = {}
 

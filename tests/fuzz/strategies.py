@@ -50,6 +50,18 @@ def fuzzed(percent: float) -> Callable[[Test], Test]:
     return lambda test: seed(SEED)(chosen(test))
 
 
+def documents(*keys: str, leaves: st.SearchStrategy[Any] | None = None) -> st.SearchStrategy[Any]:
+    """Documents of JSON whose objects have these keys; numbers may be infinite or none."""
+    usual = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5)
+    return st.recursive(
+        usual if leaves is None else leaves,
+        lambda inner: (
+            st.lists(inner, max_size=3) | st.dictionaries(st.sampled_from(keys), inner, max_size=5)
+        ),
+        max_leaves=12,
+    )
+
+
 JSON_TOKENS = (
     *("null", "true", "-1", "0", "1e308", "-1e308", "1e999", "NaN", "-Infinity", "-0.0", "5e-324"),
     *("9" * 25, "9" * 400, "9" * 6000, "-" + "9" * 6000, "0." + "3" * 5000),

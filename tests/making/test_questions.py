@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from phyblock.data.base import QuestionSet
+from phyblock.data.base import Dataset, QuestionSet
 from phyblock.data.questions import StoredQuestion, read_questions
 from phyblock.data.scenes import read_builtin
 from phyblock.domain.blocks import COLORS
@@ -25,7 +25,6 @@ from phyblock.sim.engine import other_engine
 from phyblock.sim.pictures import COLOR_RGB
 from phyblock.sim.question_pictures import is_inside, least_difference, seen
 from phyblock.workers import open_workers
-from tests.workspace import Workspace
 from tests.workspace import questions as asked_questions
 from tests.workspace import write_questions as write_asked
 
@@ -244,11 +243,10 @@ def test_colors_of_a_question_are_told_apart_by_everybody(seen_as):
 
 
 @pytest.fixture(scope="module")
-def asked(tmp_path_factory: pytest.TempPathFactory) -> list[Question]:
-    root = tmp_path_factory.mktemp("audited")
-    scenes = read_builtin(Workspace(root, root / "pictures").write_scenes())
-    folder = write_asked(root / "questions", asked_questions(per_subtask=8))
-    return [task.question for task in read_questions(folder, scenes).tasks]
+def asked(tmp_path_factory: pytest.TempPathFactory, towers: Dataset) -> list[Question]:
+    folder = tmp_path_factory.mktemp("audited") / "questions"
+    found = read_questions(write_asked(folder, asked_questions(per_subtask=8)), towers)
+    return [task.question for task in found.tasks]
 
 
 def of(asked: list[Question], subtask: str) -> list[Question]:

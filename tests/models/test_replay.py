@@ -20,6 +20,7 @@ from phyblock.models.request import Model, Request
 from phyblock.records.record import Reply, Usage
 from phyblock.tracks.full_planning import PLAN_RULES, PlanSubject
 from tests.data.broken import plan_record
+from tests.fuzz.strategies import documents
 from tests.models.factory import CANDIDATES, SCENE, make_request
 
 STEPS = "Step1: Move block with index 3"
@@ -204,22 +205,14 @@ def test_another_shape_is_an_error_that_names_the_file_and_its_keys(raw):
     assert caught.value.problems[0].found == found
 
 
-WORDS = (
+DOCUMENTS = documents(
     *("choices", "message", "content", "text", "output", "usage", "candidates", "parts", "value"),
     *("finish_reason", "thinking", "response", "body", "predict", "promptFeedback", "refusal"),
     *("model", "modelVersion", "prompt_tokens", "input_tokens", "promptTokenCount"),
 )
-texts = st.text(st.characters(), max_size=5)
-json_values = st.recursive(
-    st.none() | st.booleans() | st.integers() | st.floats() | texts,
-    lambda inner: (
-        st.lists(inner, max_size=3) | st.dictionaries(st.sampled_from(WORDS), inner, max_size=4)
-    ),
-    max_leaves=12,
-)
 
 
-@given(json_values)
+@given(DOCUMENTS)
 def test_any_document_is_read_or_refused_with_a_data_error(raw):
     """Values that are read can be written: texts as UTF-8, counts as numbers."""
     try:

@@ -2,6 +2,7 @@
 
 import asyncio
 from collections import Counter
+from dataclasses import dataclass
 
 import pytest
 from hypothesis import given, settings
@@ -28,21 +29,16 @@ REFUSED = UnreachableError("connection refused")
 LOST = RetryableError("connection refused", sent="lost")
 
 
+@dataclass
 class Outage:
     """A client whose server is away from `begins_s` until `ends_s`; calls take `takes_s`."""
 
-    def __init__(
-        self,
-        time: FakeTime,
-        begins_s: float,
-        ends_s: float,
-        takes_s: float,
-        error: RetryableError = LOST,
-    ) -> None:
-        self.time = time
-        self.error = error
-        self.begins_s, self.ends_s, self.takes_s = begins_s, ends_s, takes_s
-        self.failed = self.answered = 0
+    time: FakeTime
+    begins_s: float
+    ends_s: float
+    takes_s: float
+    failed: int = 0
+    answered: int = 0
 
     def is_away(self) -> bool:
         return self.begins_s <= self.time.now_s < self.ends_s
@@ -53,7 +49,7 @@ class Outage:
             await self.time.sleep(self.takes_s)
         if was_away or self.is_away():
             self.failed += 1
-            raise RetryableError(str(self.error), status=self.error.status, sent=self.error.sent)
+            raise RetryableError(str(LOST), sent=LOST.sent)
         self.answered += 1
         return Reply(text="Step1: Move block with index 1")
 

@@ -73,10 +73,9 @@ def test_a_call_of_another_run_is_foreign():
 
 
 @pytest.fixture(scope="module")
-def runs(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Workspace:
+def runs(new_workspace: Callable[..., Workspace]) -> Workspace:
     """Two runs that differ in the background of their pictures alone: `out` and `other`."""
-    made = Workspace(tmp_path_factory.mktemp("runs"), pictures_dir)
-    made.write_scenes()
+    made = new_workspace()
     for name, background in (("other", "white"), ("out", "checkerboard")):
         made.out = made.root / name
         made.write_suite(models=["random"], images={"size_px": 128, "background": background})

@@ -14,14 +14,13 @@ from PIL import Image as PillowImage
 
 from phyblock.data.base import Dataset, QuestionSet
 from phyblock.data.questions import read_questions
-from phyblock.data.scenes import read_builtin
 from phyblock.domain.question import LETTERS, is_picture_option
 from phyblock.integrations import huggingface
 from phyblock.integrations.files import write_vlmevalkit
 from phyblock.results.export import export_frame, export_run
 from phyblock.results.load import load_run
 from tests.web.factory import LEVELS, manifest, record, score, write_run
-from tests.workspace import Workspace, csv_rows, write_questions
+from tests.workspace import csv_rows, write_questions
 
 HF = "the package datasets is not installed"
 
@@ -103,14 +102,8 @@ def test_a_hugging_face_dataset_has_the_right_rows(folder, tmp_path):
 
 
 @pytest.fixture(scope="module")
-def scenes(tmp_path_factory: pytest.TempPathFactory) -> Dataset:
-    root = tmp_path_factory.mktemp("scenes")
-    return read_builtin(Workspace(root, root / "pictures").write_scenes())
-
-
-@pytest.fixture(scope="module")
-def question_set(tmp_path_factory: pytest.TempPathFactory, scenes: Dataset) -> QuestionSet:
-    return read_questions(write_questions(tmp_path_factory.mktemp("vqa") / "q"), scenes)
+def question_set(tmp_path_factory: pytest.TempPathFactory, towers: Dataset) -> QuestionSet:
+    return read_questions(write_questions(tmp_path_factory.mktemp("vqa") / "q"), towers)
 
 
 def rows_of(path: Path) -> list[dict[str, str]]:
@@ -118,9 +111,9 @@ def rows_of(path: Path) -> list[dict[str, str]]:
     return csv_rows(path, delimiter="\t")
 
 
-def test_tsv_files_are_as_vlmevalkit_reads_them(question_set, scenes, tmp_path):
+def test_tsv_files_are_as_vlmevalkit_reads_them(question_set, towers, tmp_path):
     out, asked_of = tmp_path / "out", str(question_set.root)
-    files = write_vlmevalkit(out, asked_of, str(scenes.root), None, 128)
+    files = write_vlmevalkit(out, asked_of, str(towers.root), None, 128)
     choice, ordering = (rows_of(file) for file in files)
     asked = {task.key: task.question for task in question_set.tasks}
     assert {row["index"] for row in (*choice, *ordering)} == set(asked)
@@ -149,10 +142,10 @@ def test_tsv_files_are_as_vlmevalkit_reads_them(question_set, scenes, tmp_path):
     assert all(len(row["answer"]) == 4 for row in ordering)
 
 
-def test_a_hugging_face_dataset_has_questions_and_pictures(question_set, scenes, tmp_path):
+def test_a_hugging_face_dataset_has_questions_and_pictures(question_set, towers, tmp_path):
     datasets = pytest.importorskip("datasets", reason=HF)
     out, asked_of = tmp_path / "out", str(question_set.root)
-    parquet, _ = huggingface.write_questions(out, asked_of, str(scenes.root), None, 128)
+    parquet, _ = huggingface.write_questions(out, asked_of, str(towers.root), None, 128)
     cache = str(tmp_path / "cache")
     for rows in [datasets.load_dataset(str(parquet.parent), cache_dir=cache, split="test")]:
         assert rows["id"][:] == [task.key for task in question_set.tasks]
@@ -162,13 +155,13 @@ def test_a_hugging_face_dataset_has_questions_and_pictures(question_set, scenes,
             assert [image.size for image in row["images"]] == [(128, 128)] * len(row["labels"])
 
 
-def test_scenes_with_their_pictures_and_all_that_is_known_of_them(scenes, tmp_path):
+def test_scenes_with_their_pictures_and_all_that_is_known_of_them(towers, tmp_path):
     datasets = pytest.importorskip("datasets", reason=HF)
-    parquet, card = huggingface.write_scenes(tmp_path / "out", str(scenes.root), None, 128)
+    parquet, card = huggingface.write_scenes(tmp_path / "out", str(towers.root), None, 128)
     cache = str(tmp_path / "cache")
     rows = datasets.load_dataset(str(parquet.parent), cache_dir=cache, split="test")
     assert "configs:" in card.read_text("utf-8")
-    lines = (scenes.root / "scenes.jsonl").read_text("utf-8").splitlines()
+    lines = (towers.root / "scenes.jsonl").read_text("utf-8").splitlines()
     assert [json.loads(one)["id"] for one in rows["scene"]] == rows["id"][:]
     assert len(rows) == len(lines)
     for name in ("goal", "candidates"):

@@ -20,7 +20,6 @@ from phyblock.run.plan import make_plan
 from phyblock.run.store import AppendFile, Progress, RunStore
 from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat
-from tests.workspace import Workspace
 
 values = st.dictionaries(st.text(max_size=5), st.text(max_size=5) | st.integers(), max_size=4)
 
@@ -145,15 +144,13 @@ def test_a_limit_counts_every_call_once_and_one_without_an_end_in_full(calls):
     assert {model: progress.limit_usd.get(model, 0.0) for model in "ab"} == expected
 
 
-def test_every_record_names_a_prompt_that_is_there(tmp_path, pictures_dir):
-    made = Workspace(tmp_path, pictures_dir)
-    made.write_scenes()
-    made.write_suite(models=["alpha", "oracle"])
+def test_every_record_names_a_prompt_that_is_there(workspace):
+    workspace.write_suite(models=["alpha", "oracle"])
     with Running(OpenAIChat()) as running:
-        made.write_models(running.url, "alpha")
-        assert made.run().code == 0
-    prompts = read_prompts(made.out)
-    sent = {record["prompt"]["messages"] for record in made.records() if record["prompt"]}
+        workspace.write_models(running.url, "alpha")
+        assert workspace.run().code == 0
+    prompts = read_prompts(workspace.out)
+    sent = {record["prompt"]["messages"] for record in workspace.records() if record["prompt"]}
     assert sent == set(prompts) != set()
     for digest, messages in prompts.items():
         fields = [message.fields() for message in messages]

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 from types import FrameType
 
@@ -29,10 +30,9 @@ SCORED = ("estimates.csv", "errors.csv", "errors.md", "table1.csv", "table1.md",
 
 
 @pytest.fixture(scope="module")
-def finished(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Workspace:
+def finished(new_workspace: Callable[..., Workspace]) -> Workspace:
     """A run of a model that answers, one whose every call fails, and two baselines."""
-    made = Workspace(tmp_path_factory.mktemp("laws"), pictures_dir)
-    made.write_scenes()
+    made = new_workspace()
     made.write_suite(models=["alpha", "random", "oracle"], seeds=[0, 1, 2])
     with Running(OpenAIChat()) as running:
         made.write_models(running.url, "alpha")
@@ -57,32 +57,24 @@ def scores(records: list[Raw]) -> dict[str, Raw]:
     return {r["sample"]: {k: r[k] for k in ("outcome", "parse", "scores")} for r in records}
 
 
-def test_records_in_any_order_give_the_same_tables(copy):
-    before = copy.tables()
+def test_tables_follow_from_the_records_byte_for_byte(copy):
+    files, tables = copy.files(), copy.tables()
+    done = copy.phyblock("score", "out", fresh=True)
+    assert (done.code, done.err) == (0, "")
+    assert lasting(copy.files()) == lasting(files)
     path = copy.out / "records.jsonl"
     lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
     random.Random(3).shuffle(lines)
     path.write_text("".join(lines), encoding="utf-8")
-    # Tables alone are made anew, in a process of another hash seed.
+    # Tables alone are made anew, in a process of another hash seed; then without the data.
     shutil.rmtree(copy.out / "tables")
     assert copy.run(fresh=True).code == 0
-    assert copy.tables() == before
-
-
-def test_tables_are_rebuilt_byte_for_byte(copy):
-    before = copy.tables()
+    assert copy.tables() == tables
     shutil.rmtree(copy.out / "tables")
     (copy.root / "data").rename(copy.root / "elsewhere")
     done = copy.phyblock("report", "out")
     assert (done.code, done.err) == (0, "")
-    assert copy.tables() == before
-
-
-def test_scoring_again_by_the_same_rules_changes_nothing(copy):
-    before = copy.files()
-    done = copy.phyblock("score", "out", fresh=True)
-    assert (done.code, done.err) == (0, "")
-    assert lasting(copy.files()) == lasting(before)
+    assert copy.tables() == tables
 
 
 def test_replies_from_the_cache_are_worth_the_same(copy):
@@ -162,12 +154,17 @@ def test_a_limit_keeps_some_of_every_level_and_is_a_run_of_its_own(copy):
     assert "found: different: limit" in other.err
 
 
-def test_what_does_not_change_results_does_not_make_another_run(copy):
+def test_only_what_may_change_a_reply_makes_another_run(copy):
     labels = {"size_b": 7, "published": "GPT-4o", "price": {"input": 1.0, "output": 2.0}}
     copy.write_models("http://127.0.0.1:9", "alpha", transport="litellm", **labels)
     sets = ("--set", "limits.max_concurrency=1", "--set", "description=x")
     done = copy.completed(*sets, "--models", "oracle,random,alpha")
     assert "All 45 samples are done" in done.out
+    copy.write_models("http://127.0.0.1:9", "alpha", temperature=0.5)
+    assert copy.run("--models", "oracle").code == 0
+    done = copy.run("--models", "alpha")
+    assert done.code == 2
+    assert "found: different: models.alpha.params" in done.err
 
 
 @pytest.mark.parametrize("order", ["file", "shuffled"])
@@ -191,14 +188,6 @@ def test_more_models_and_seeds_go_on_in_the_folder_and_fewer_select_from_it(work
     assert "All 30 samples are done" in again.out
     assert len(workspace.records()) == 30
     assert workspace.tables() == whole
-
-
-def test_a_model_that_is_asked_otherwise_makes_another_run(copy):
-    copy.write_models("http://127.0.0.1:9", "alpha", temperature=0.5)
-    assert copy.run("--models", "oracle").code == 0
-    done = copy.run("--models", "alpha")
-    assert done.code == 2
-    assert "found: different: models.alpha.params" in done.err
 
 
 def test_a_folder_that_holds_no_record_is_free_for_the_mended_suite(workspace):
@@ -234,23 +223,21 @@ def test_what_is_no_version_is_refused(tmp_path, text):
         read_version(tmp_path)
 
 
-def test_runs_on_two_versions_are_not_mixed(tmp_path):
-    work = Workspace(tmp_path, tmp_path / "pictures")
-    folder = work.write_scenes()
-    work.write_suite(levels=[1])
-    assert work.run().code == 0
-    assert work.run().code == 0
-    (folder / VERSION_FILE).write_text("2\n", encoding="utf-8")
-    refused = work.run()
+def test_runs_on_two_versions_are_not_mixed(workspace):
+    workspace.write_suite(levels=[1])
+    assert workspace.run().code == 0
+    assert workspace.run().code == 0
+    (workspace.root / "data" / VERSION_FILE).write_text("2\n", encoding="utf-8")
+    refused = workspace.run()
     assert refused.code != 0
     assert "out: holds another run" in refused.err
     assert "dataset.version (1, now 2)" in refused.err
-    newer = tmp_path / "newer"
-    assert work.phyblock("run", "suite.yaml", "--out", newer, "--no-report").code == 0
-    versions = [read_manifest(path).dataset for path in (work.out, newer)]
+    newer = workspace.root / "newer"
+    assert workspace.phyblock("run", "suite.yaml", "--out", newer, "--no-report").code == 0
+    versions = [read_manifest(path).dataset for path in (workspace.out, newer)]
     assert [data.version for data in versions if data is not None] == [1, 2]
     with pytest.raises(SpecError, match=r"dataset\.version: cannot be compared"):
-        compare_runs(load_run(work.out), load_run(newer), ["oracle"])
+        compare_runs(load_run(workspace.out), load_run(newer), ["oracle"])
 
 
 def test_answers_to_two_versions_of_questions_are_not_mixed():

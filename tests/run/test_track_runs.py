@@ -33,8 +33,7 @@ RULE = "json"
 
 def schema_of(seen: Seen) -> Raw:
     """The schema that a prompt ends with."""
-    schema: Raw = json.loads(str(seen.parts[-1]).splitlines()[-1])
-    return schema
+    return json.loads(str(seen.parts[-1]).splitlines()[-1])
 
 
 def obedient(seen: Seen) -> str:
@@ -47,8 +46,12 @@ def obedient(seen: Seen) -> str:
     return text if seen.model == "alpha" else f"Here it is: {text}"
 
 
-@pytest.fixture
-def asked(inside: Workspace) -> tuple[Workspace, list[Seen]]:
+def rules(record: Raw) -> set[str | None]:
+    parses = [turn["parse"] for turn in record.get("turns", ())] or [record["parse"]]
+    return {parse["rule"] for parse in parses}
+
+
+def test_all_tracks_ask_and_read_by_the_schema(inside, capsys):
     """A whole run of three tracks and three models, and what the server saw."""
     workspace = inside
     write_questions(workspace.root / "questions", questions(subtasks=["SH", "OR"], per_subtask=1))
@@ -66,17 +69,7 @@ def asked(inside: Workspace) -> tuple[Workspace, list[Seen]]:
         entries["beta"]["response_format"] = "never"
         workspace.write_yaml("models.yaml", entries)
         assert call("run", "suite.yaml", "--out", "out", "--no-report", "--limit", 2) == 0
-    return workspace, server.seen
-
-
-def rules(record: Raw) -> set[str | None]:
-    parses = [turn["parse"] for turn in record.get("turns", ())] or [record["parse"]]
-    return {parse["rule"] for parse in parses}
-
-
-def test_all_tracks_ask_and_read_by_the_schema(asked, capsys):
-    workspace, seen = asked
-    for one in seen:
+    for one in server.seen:
         sent = one.params.get("response_format")
         assert (sent is not None) == (one.model == "alpha")
         assert sent is None or sent["json_schema"]["schema"] == schema_of(one)

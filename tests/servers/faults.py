@@ -126,8 +126,7 @@ def _with_key(body: dict[str, Any], seen: Seen) -> dict[str, Any]:
     for name in ("model", "modelVersion"):
         if name in body:
             body[name] = f"{body[name]}-{seen.key}"
-    told: dict[str, Any] = _texts(body, f"{seen.reply_text}\nYour key is {seen.key}.")
-    return told
+    return _texts(body, f"{seen.reply_text}\nYour key is {seen.key}.")
 
 
 async def _echo(

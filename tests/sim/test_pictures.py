@@ -190,8 +190,7 @@ def luminance(rgb: NDArray[np.float64]) -> NDArray[np.float64]:
     """Relative luminance of colors (..., 3), 0..255, as WCAG 2.2 defines it."""
     share = rgb / 255
     linear = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
-    total: NDArray[np.float64] = linear @ np.array([0.2126, 0.7152, 0.0722])
-    return total
+    return linear @ np.array([0.2126, 0.7152, 0.0722])
 
 
 @pytest.mark.parametrize("background", slowly)

@@ -49,8 +49,7 @@ def props_of(blocks: list[Block]) -> list[Prop]:
 
 def triangles_m(prop: Prop) -> NDArray[np.float64]:
     rotation = quat_xyzw_to_matrix(prop.pose.quat_xyzw)
-    corners: NDArray[np.float64] = prop.mesh.corners_m @ rotation.T + prop.pose.position_m
-    return corners
+    return prop.mesh.corners_m @ rotation.T + prop.pose.position_m
 
 
 def camera_on(props: list[Prop], view: tuple[float, float]) -> Camera:

@@ -10,13 +10,10 @@ import yaml
 
 from phyblock.config.suite import Suite, load_suite
 from phyblock.data.base import Dataset
-from phyblock.data.scenes import read_builtin
 from phyblock.domain.scene import AssemblyTask, Block, Candidate, CandidateSet, Scene
 from phyblock.tracks.base import open_tracks
 from phyblock.tracks.pictures import Workshop
-from tests.data.broken import write_scenes
 from tests.shipped import TASKS
-from tests.workspace import SCENES
 
 
 def suite_of(**fields: Any) -> Suite:
@@ -55,9 +52,9 @@ def seesaw() -> AssemblyTask:
 
 
 @pytest.fixture(scope="session")
-def tasks(tmp_path_factory: pytest.TempPathFactory) -> tuple[AssemblyTask, ...]:
+def tasks(towers: Dataset) -> tuple[AssemblyTask, ...]:
     """The first is a red cube under a blue one; candidate 1 is the red cube, 3 the blue one."""
-    return read_builtin(write_scenes(tmp_path_factory.mktemp("data"), *SCENES)).tasks
+    return towers.tasks
 
 
 @pytest.fixture(scope="session")

@@ -5,7 +5,7 @@ import math
 import re
 import shutil
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar
@@ -54,10 +54,17 @@ LATER = ("blocks", "kept")
 
 
 @pytest.fixture
-def added() -> Iterator[None]:
-    registry.add_measure("full_planning", NEEDLESS)
-    yield
-    registry.remove_measure("full_planning", NEEDLESS.name)
+def add() -> Iterator[Callable[[str, Measure], None]]:
+    """Adds measures to tracks; they are gone after the test."""
+    added: list[tuple[str, Measure]] = []
+
+    def add(track: str, measure: Measure) -> None:
+        registry.add_measure(track, measure)
+        added.append((track, measure))
+
+    yield add
+    for track, measure in added:
+        registry.remove_measure(track, measure.name)
 
 
 @pytest.fixture
@@ -66,7 +73,7 @@ def here(inside: Workspace) -> Workspace:
     return inside
 
 
-def test_scoring_again_fills_in_what_older_records_lack(here, request):
+def test_scoring_again_fills_in_what_older_records_lack(here, add):
     assert not call("run", "suite.yaml", "--out", here.out, "--no-report")
     stored = here.records()
     assert not any("needless_steps" in record["counts"] for record in stored)
@@ -76,7 +83,7 @@ def test_scoring_again_fills_in_what_older_records_lack(here, request):
     ]
     lines = ({**line, "scores": scores} for line, scores in zip(stored, bare, strict=True))
     write_lines(here.out / "records.jsonl", lines)
-    request.getfixturevalue("added")
+    add("full_planning", NEEDLESS)
     write_tables(here.out)
     known = {row["measure"] for row in here.rows("estimates")}
     assert known.isdisjoint({"needless", "distance", "blocks_order"})
@@ -105,13 +112,6 @@ def test_scoring_again_fills_in_what_older_records_lack(here, request):
 
 SAMPLED = SampleCounts("sampled", ("part", "whole"), sample=lambda _, __: (1, 2))
 HALF = Measure("half", "Half", SAMPLED, ratio_of, "one of two")
-
-
-@pytest.fixture
-def half() -> Iterator[None]:
-    registry.add_measure("full_planning", HALF)
-    yield
-    registry.remove_measure("full_planning", "half")
 
 
 @pytest.mark.parametrize(
@@ -218,12 +218,11 @@ def is_right(_: Any, record: Any) -> tuple[float, float]:
     return record.answer.correct, 1
 
 
-def test_an_episode_that_would_have_asked_otherwise_is_no_longer_final(here, request):
+def test_an_episode_that_would_have_asked_otherwise_is_no_longer_final(here, add):
     here.write_suite(tracks=["step_planning"], steps={"physics": "off"}, levels=[3])
     assert not call("run", "suite.yaml", "--out", here.out, "--no-report")
     counted = SampleCounts("first_steps", ("placed", "n"), sample=first_is_placed)
-    registry.add_measure("step_planning", Measure("first", "First", counted, ratio_of))
-    request.addfinalizer(lambda: registry.remove_measure("step_planning", "first"))
+    add("step_planning", Measure("first", "First", counted, ratio_of))
     lines = here.records()
     lines[0]["turns"][0]["reply"]["text"] = "Done"
     write_lines(here.out / "records.jsonl", lines)
@@ -243,7 +242,7 @@ def test_an_episode_that_would_have_asked_otherwise_is_no_longer_final(here, req
         ("vqa", {"vqa": {"path": "./questions", "subtasks": ["SH"], "circular": True}}, is_right),
     ],
 )
-def test_scoring_again_counts_in_every_track(here, request, track, more, counts):
+def test_scoring_again_counts_in_every_track(here, add, track, more, counts):
     write_questions(here.root / "questions")
     here.write_suite(tracks=[track], models=["oracle", "random"], **more)
     folders = [here.root / name for name in ("out", "same", "new", "scored")]
@@ -253,8 +252,7 @@ def test_scoring_again_counts_in_every_track(here, request, track, more, counts)
         shutil.copytree(old, copy)
     rescore(same)
     counted = SampleCounts("sampled", ("part", "whole"), sample=counts)
-    registry.add_measure(track, Measure("part", "Part", counted, ratio_of, "a part"))
-    request.addfinalizer(lambda: registry.remove_measure(track, "part"))
+    add(track, Measure("part", "Part", counted, ratio_of, "a part"))
     assert not call("run", "suite.yaml", "--out", new, "--no-report")
     rescore(scored)
     before, unchanged, fresh, again = map(here.records, folders)
@@ -264,13 +262,11 @@ def test_scoring_again_counts_in_every_track(here, request, track, more, counts)
     assert len({tuple(now["sampled"]) for now in counts_now.values()}) == 2
 
 
-@pytest.mark.usefixtures("half")
 @pytest.mark.parametrize(
     "other", [HALF, replace(HALF, name="other", counted=replace(SAMPLED, columns=("a", "b")))]
 )
-def test_two_measures_or_counts_of_one_name_are_refused(other, request):
-    registry.add_measure("full_planning", other)
-    request.addfinalizer(lambda: registry.add_measure("full_planning", HALF))
-    request.addfinalizer(lambda: registry.remove_measure("full_planning", other.name))
+def test_two_measures_or_counts_of_one_name_are_refused(add, other):
+    for measure in (HALF, other):
+        add("full_planning", measure)
     with pytest.raises(ValueError, match="are called"):
         track_measures("full_planning")

@@ -39,8 +39,7 @@ STANDS = "Step1: block 1 at (0, 0, 2.5)\nStep2: block 3 at (0, 0, 7.5)"
 @functools.cache
 def poses() -> PosePlanning:
     """The track, judging in this process."""
-    track: PosePlanning = track_of("pose_planning", TASKS[:1])
-    return track
+    return track_of("pose_planning", TASKS[:1])
 
 
 @pytest.fixture(scope="session")

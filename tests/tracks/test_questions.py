@@ -11,9 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.data.base import QuestionSet, QuestionTask
+from phyblock.data.base import Dataset, QuestionSet, QuestionTask
 from phyblock.data.questions import read_questions
-from phyblock.data.scenes import read_builtin
 from phyblock.domain.question import LETTERS, SUBTASKS, Question, Subtask, rotated
 from phyblock.domain.scene import Scene
 from phyblock.models.request import Image, Request
@@ -30,7 +29,7 @@ from phyblock.tracks.questions import (
     select_questions,
 )
 from tests.tracks.conftest import track_of
-from tests.workspace import Workspace, in_a_loop, write_questions
+from tests.workspace import in_a_loop, write_questions
 
 STYLE = PictureStyle(size_px=128)
 LEVELS = (1, 2, 3, 4)
@@ -38,10 +37,8 @@ OPTIONS = ("cube", "arch", "cylinder", "cuboid")
 
 
 @pytest.fixture(scope="module")
-def question_set(tmp_path_factory: pytest.TempPathFactory) -> QuestionSet:
-    root = tmp_path_factory.mktemp("vqa")
-    scenes = read_builtin(Workspace(root, root / "pictures").write_scenes())
-    return read_questions(write_questions(root / "questions"), scenes)
+def question_set(tmp_path_factory: pytest.TempPathFactory, towers: Dataset) -> QuestionSet:
+    return read_questions(write_questions(tmp_path_factory.mktemp("vqa") / "q"), towers)
 
 
 def opened(found: QuestionSet, shop: Workshop | None, size_px: int = 128, **vqa: Any) -> Vqa:

@@ -125,13 +125,12 @@ class PageVisit(Visit):
 
 
 @pytest.fixture(scope="session")
-def made(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Workspace:
+def made(new_workspace: Callable[..., Workspace]) -> Workspace:
     """A run, with its report, of two baselines on five scenes and six questions, two seeds each.
 
     One reply says `HOSTILE`, one plans 9, 3; one is missing. No test changes it.
     """
-    made = Workspace(tmp_path_factory.mktemp("page"), pictures_dir)
-    made.write_scenes()
+    made = new_workspace()
     write_questions(made.root / "questions", questions(per_subtask=2, subtasks=SUBTASKS))
     made.write_suite(
         tracks=["full_planning", "vqa", "step_planning"],
@@ -162,10 +161,9 @@ def made(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Worksp
 
 
 @pytest.fixture(scope="session")
-def troubled(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Workspace:
+def troubled(new_workspace: Callable[..., Workspace]) -> Workspace:
     """A run of two models, of which one has no key, limited to two items of each track."""
-    troubled = Workspace(tmp_path_factory.mktemp("troubled"), pictures_dir)
-    troubled.write_scenes()
+    troubled = new_workspace()
     troubled.write_suite(
         models=["alpha", "locked"],
         seeds=[0],
@@ -182,10 +180,9 @@ def troubled(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Wo
 
 
 @pytest.fixture(scope="session")
-def runs(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Workspace:
+def runs(new_workspace: Callable[..., Workspace]) -> Workspace:
     """`first`: two baselines in four tracks; `later.zip`: a bundle of two in one of them."""
-    made = Workspace(tmp_path_factory.mktemp("site"), pictures_dir)
-    made.write_scenes()
+    made = new_workspace()
     write_questions(made.root / "questions", questions(per_subtask=2, subtasks=["SH", "OR"]))
     fields = {"vqa": {"path": "./questions", "subtasks": ["SH", "OR"]}, "seeds": [0]}
     tracks = ["full_planning", "vqa", "step_planning", "pose_planning"]

@@ -15,7 +15,6 @@ from phyblock.scoring.plan import ERROR_TYPES
 from phyblock.web.report import write_report
 from tests.web.conftest import HOSTILE, NAME, PageVisit, expect
 from tests.web.factory import manifest, write_run
-from tests.workspace import Workspace
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -34,8 +33,7 @@ def painted(page: Page, selector: str) -> int:
         const { data } = context.getImageData(0, 0, canvas.width, canvas.height);
         return new Uint32Array(data.buffer).filter(pixel => pixel >>> 24).length;
     }"""
-    count: int = page.eval_on_selector(selector, script)
-    return count
+    return page.eval_on_selector(selector, script)
 
 
 STRUCTURE = """() => {
@@ -436,9 +434,9 @@ def test_every_view_can_be_read_and_reached_and_hostile_names_do_nothing(
 
 
 def test_a_leaderboard_says_what_was_found_and_shows_how_models_fail(
-    official_checkout, visiting, tmp_path_factory, pictures_dir
+    official_checkout, visiting, new_workspace
 ):
-    made = Workspace(tmp_path_factory.mktemp("paper"), pictures_dir)
+    made = new_workspace()
     path = f"dataset.path={official_checkout}"
     made.phyblock(
         "run", "paper-table1", "--set", path, "--limit", "8", "--out", "out", "--no-report"

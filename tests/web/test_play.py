@@ -22,7 +22,7 @@ from phyblock.run.runner import RunResult
 from phyblock.tracks.picking import Choice, Pick, Picking
 from phyblock.web.server import LARGEST_BODY_BYTES, Server
 from phyblock.web.session import NotNowError, Person, PlaySession, plan_session
-from tests.workspace import SCENES, Workspace, in_a_loop, read_lines
+from tests.workspace import SCENES, in_a_loop
 
 PICTURE = Image(b"pixels", "candidates", 64, 64)
 PICKING = Picking(
@@ -138,11 +138,9 @@ def played(suite: Path, picks: Sequence[int]) -> tuple[RunResult, list[str]]:
     return asyncio.run(sat()), shown
 
 
-def test_an_episode_goes_on_where_the_sitting_was_closed(tmp_path, pictures_dir, monkeypatch):
-    workspace = Workspace(tmp_path, pictures_dir)
-    workspace.write_scenes(SCENES[0])
-    monkeypatch.setenv("PHYBLOCK_CACHE", str(workspace.cache))
-    suite = workspace.write_suite(tracks=["step_planning"], steps={"physics": "off"})
+def test_an_episode_goes_on_where_the_sitting_was_closed(inside):
+    inside.write_scenes(SCENES[0])
+    suite = inside.write_suite(tracks=["step_planning"], steps={"physics": "off"})
     red, blue = 0, 2
     result, shown = played(suite, [blue, red])
     assert (result.settled, result.left) == (0, 1)
@@ -150,23 +148,19 @@ def test_an_episode_goes_on_where_the_sitting_was_closed(tmp_path, pictures_dir,
     result, shown = played(suite, [blue])
     assert (result.settled, result.left) == (1, 0)
     assert "This is step 3 of" in shown[0]
-    (record,) = read_lines(tmp_path / "out" / "records.jsonl")
+    (record,) = inside.records()
     assert record["outcomes"] == ["dependency_not_met", "placed", "placed"]
     moves = ["Next plan: Move(3)", "Next plan: Move(1)", "Next plan: Move(3)"]
     assert [turn["reply"]["text"] for turn in record["turns"]] == moves
 
 
-def test_a_warm_up_on_another_scene_of_level_1_is_shown_how_it_went_and_not_kept(
-    tmp_path, pictures_dir, monkeypatch
-):
-    workspace = Workspace(tmp_path, pictures_dir)
-    monkeypatch.setenv("PHYBLOCK_CACHE", str(workspace.cache))
-    workspace.write_scenes(*SCENES[:2])
-    suite = workspace.write_suite(limit=1, baselines=["goal-blind", "random"])
+def test_a_warm_up_on_another_scene_of_level_1_is_shown_how_it_went_and_not_kept(inside):
+    inside.write_scenes(*SCENES[:2])
+    suite = inside.write_suite(limit=1, baselines=["goal-blind", "random"])
     _, (warm_up, went, question) = played(suite, [0, 2])
     assert ['"number": 0' in warm_up, '"number": 1' in question] == [True, True]
     assert [step["name"] for step in json.loads(went)["steps"]] == ["1"]
-    lines = read_lines(tmp_path / "out" / "records.jsonl")
+    lines = inside.records()
     records = {one["model"]: one for one in lines}
     # Rules that never see the goal stand beside the person.
     assert records.keys() == {"human:ada", "goal-blind", "random"}

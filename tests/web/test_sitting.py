@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,14 +29,12 @@ ADA = ("play", "suite.yaml", "--name", "ada")
 
 
 @pytest.fixture(scope="module")
-def workspace(tmp_path_factory: pytest.TempPathFactory, pictures_dir: Path) -> Workspace:
+def workspace(new_workspace: Callable[..., Workspace]) -> Workspace:
     """Three scenes and four questions, hostile texts in these; scenes are asked about without poses
     and with. A run of two baselines.
     """
-    made = Workspace(tmp_path_factory.mktemp("play"), pictures_dir)
-    scenes = SCENES[:3]
-    made.write_scenes(*scenes)
-    asked = questions(scenes[:2], 1, SUBTASKS)
+    made = new_workspace(*SCENES[:3])
+    asked = questions(SCENES[:2], 1, SUBTASKS)
     for one in asked:
         one["question"] += HOSTILE
         one["options"] = [o if o.startswith("<img") else f"{o} {HOSTILE}" for o in one["options"]]
@@ -115,8 +113,7 @@ def answered(folder: Path) -> list[Raw]:
 
 
 def said(record: Raw) -> str:
-    text: str = record["reply"]["text"]
-    return text
+    return record["reply"]["text"]
 
 
 def plan(*numbers: int) -> str:
