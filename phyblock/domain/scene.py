@@ -248,3 +248,9 @@ class AssemblyTask:
     def key(self) -> str:
         """The scene's id, by which samples name the task."""
         return self.scene.id
+
+    @functools.cached_property
+    def offered(self) -> tuple[tuple[Kind, bool], ...]:
+        """The kind of each candidate, and True if the goal needs it in that pose."""
+        needed = {block.look for block in self.scene.blocks}
+        return tuple((one.kind, one.look in needed) for one in self.candidates.candidates)

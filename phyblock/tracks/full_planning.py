@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal
@@ -12,7 +11,7 @@ import numpy as np
 
 from phyblock.config.validation import PictureControls
 from phyblock.data.official import official_prompt
-from phyblock.domain.scene import AssemblyTask, Block, CandidateSet, Plan, Scene
+from phyblock.domain.scene import AssemblyTask, Block, CandidateSet, Kind, Plan, Scene
 from phyblock.errors import DataError, Problem, SpecError
 from phyblock.files import bundled
 from phyblock.parsing.plan import ParsedPlan, parse_plan, plan_form
@@ -138,32 +137,29 @@ def pick_plan(subject: PlanSubject) -> Picking:
     )
 
 
-def pose_choices(
-    scene: Scene, candidates: CandidateSet, steps: Sequence[int]
-) -> Iterator[tuple[bool, bool]]:
+def pose_choices(item: AssemblyTask, steps: Sequence[int]) -> Iterator[tuple[bool, bool]]:
     """Yield two booleans for each named kind whose pose could be wrong: True if the pose that is
     listed first is right, and True if the pose that was named first is.
 
     Such a kind is needed in one or more poses, and also offered in others. Numbers that no
     candidate has are ignored.
     """
-    needed = {block.look for block in scene.blocks}
-    offered = [(one.kind, one.look in needed) for one in candidates.candidates]
-    chosen: dict[Any, bool] = {}
+    offered, chosen = item.offered, dict[Kind, bool]()
     for step in steps:
         if 1 <= step <= len(offered):
             chosen.setdefault(*offered[step - 1])
-    for kind in sorted({block.kind for block in scene.blocks} & chosen.keys()):
+    needed = {block.kind for block in item.scene.blocks}
+    for kind in needed & chosen.keys():
         right = [is_right for of, is_right in offered if of == kind]
         if not all(right):
             yield right[0], chosen[kind]
 
 
-def pose_counts(item: Any, record: Any) -> tuple[int, ...]:
+def pose_counts(item: AssemblyTask, record: Any) -> tuple[int, ...]:
     """Return the counts of `POSE_COUNTS` for a plan or an episode."""
-    choices = Counter(pose_choices(item.scene, item.candidates, record.parse.plan))
-    of = {first: choices[first, True] for first in (True, False)}
-    return of[True], of[True] + choices[True, False], of[False], of[False] + choices[False, False]
+    choices = list(pose_choices(item, record.parse.plan))
+    n = [choices.count(one) for one in ((True, True), (True, False), (False, True), (False, False))]
+    return n[0], n[0] + n[1], n[2], n[2] + n[3]
 
 
 POSE_COUNTS = SampleCounts(

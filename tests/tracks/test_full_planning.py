@@ -128,6 +128,8 @@ def test_the_first_pose_named_of_a_kind_counts(plan, counts):
 def test_the_order_of_the_list_moves_choices_between_first_and_later_alone(plan, order):
     shown = CandidateSet(tuple(CANDIDATES[number] for number in order))
     there = [order.index(n) + 1 if 1 <= n <= 7 else n for n in plan]
-    here = sorted(is_right for _, is_right in pose_choices(SCENE, CANDIDATES, plan))
-    assert here == sorted(is_right for _, is_right in pose_choices(SCENE, shown, there))
+    here = sorted(is_right for _, is_right in pose_choices(AssemblyTask(SCENE, CANDIDATES), plan))
+    assert here == sorted(
+        is_right for _, is_right in pose_choices(AssemblyTask(SCENE, shown), there)
+    )
     assert len(here) <= len(set(plan))
