@@ -202,7 +202,7 @@ def test_a_tilde_is_the_home_folder(suite, monkeypatch):
     invoked("init", "~/bench", HOME=home)
     invoked("run", suite.root / "suite.yaml", "--out", "~/run", "--no-report", HOME=home)
     assert (suite.root / "home" / "bench" / "models.yaml").is_file()
-    assert "Assembly planning" in invoked("report", "~/run", "--print", HOME=home).output
+    assert "Full planning" in invoked("report", "~/run", "--print", HOME=home).output
     assert not (suite.root / "~").exists()
 
 

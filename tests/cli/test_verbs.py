@@ -234,7 +234,7 @@ def call(*words: str | Path) -> Result:
 
 def test_tables_print_all_or_one_in_any_form(folder):
     everything = call("report", folder, "--print").output
-    for caption in ("Assembly planning", "Wrong steps by type", "Coverage", "Tokens, cost"):
+    for caption in ("Full planning", "Wrong steps by type", "Coverage", "Tokens, cost"):
         assert caption in everything
     one = call("report", folder, "--print", "--only", "errors", "--format", "md").output
     assert one.startswith("**Wrong steps by type (%)")

@@ -72,7 +72,7 @@ def test_a_reader_comes_to_the_end(page, workspace):
     for name in LEFT[page]:
         assert (workspace.root / "reader" / name).exists(), name
     if page == "first-model.md":
-        table = printed[printed.index("Assembly planning") :]
+        table = printed[printed.index("Full planning") :]
         assert re.search(r"^\W*my-model\b.*\d", table, re.M)
         assert "All 24 samples are done" in printed
 
