@@ -93,29 +93,17 @@ def candidates() -> list[Raw]:
 
 def tower(scene_id: str, levels: list[int], colors: tuple[str, ...]) -> Raw:
     """Cubes of the given colors, each on the one before."""
-    blocks = [
-        {
-            "order": i,
-            "type": "cube",
-            "color": color,
-            "layer": i,
-            "depend": [i - 1],
-            "position": [0, 0, (i - 0.5) * _CUBE_M],
-            "euler": [0, 0, 0],
-        }
-        for i, color in enumerate(colors, 1)
-    ]
+    blocks = []
+    for i, color in enumerate(colors, 1):
+        place = {"layer": i, "depend": [i - 1], "position": [0, 0, (i - 0.5) * _CUBE_M]}
+        cube = {"type": "cube", "color": color, "euler": [0, 0, 0]}
+        blocks.append({"order": i, **cube, **place})
     needed = [
         {**c, "required": colors.count(c["color"]) if c["type"] == "cube" else 0}
         for c in candidates()
     ]
-    return {
-        "id": scene_id,
-        "levels": levels,
-        "parents": [scene_id],
-        "blocks": blocks,
-        "candidates": needed,
-    }
+    named = {"id": scene_id, "levels": levels, "parents": [scene_id]}
+    return {**named, "blocks": blocks, "candidates": needed}
 
 
 SCENES: tuple[Raw, ...] = (

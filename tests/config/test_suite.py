@@ -80,17 +80,10 @@ def test_identity_is_json_without_bounds_places_and_order(raw, data):
     assert identities[0] == identities[1] != identity
 
 
+INNER = {f"{name}.{key}": some for name, one in SECTIONS.items() for key, some in one.items()}
+UNKNOWN = {"levls": st.just(1), "images.x": st.just(1)}
 CHANGES = st.one_of(
-    st.fixed_dictionaries({}, optional={**FIELDS, **REQUIRED}),
-    st.fixed_dictionaries(
-        {},
-        optional={
-            f"{section}.{name}": values
-            for section, fields in SECTIONS.items()
-            for name, values in fields.items()
-        },
-    ),
-    st.fixed_dictionaries({}, optional={"levls": st.just(1), "images.x": st.just(1)}),
+    *(st.fixed_dictionaries({}, optional=o) for o in ({**FIELDS, **REQUIRED}, INNER, UNKNOWN))
 )
 
 

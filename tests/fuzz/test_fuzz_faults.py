@@ -76,15 +76,9 @@ def prepare(workspace: Workspace, url: str, track: str, transport: str, seeds: l
     if transport == "direct":  # by two addresses, so that what fails at one is asked at the other
         fields["api_base"] = [f"{one}/v1" for one in (url, url.replace("127.0.0.1", "localhost"))]
     workspace.write_models(url, "alpha", **fields)
-    workspace.write_suite(
-        **{
-            "images": {"size_px": 128},
-            **_TRACKS[track],
-            "models": ["alpha"],
-            "seeds": seeds,
-            "limits": {"max_concurrency": 24, "timeout_s": 20.0},
-        }
-    )
+    limits = {"max_concurrency": 24, "timeout_s": 20.0}
+    asked = {"models": ["alpha"], "seeds": seeds, "limits": limits}
+    workspace.write_suite(**{"images": {"size_px": 128}, **_TRACKS[track], **asked})
 
 
 def run(workspace: Workspace, *args: str) -> Ended:

@@ -162,57 +162,35 @@ def _official(picture: bytes, candidates: bytes | None) -> Case:
     return Case((*RUN, *_sets(sets)), files, ("fresh",))
 
 
+def _replies(*texts: bytes) -> Case:
+    files = {f"replies/t{n}.json": text for n, text in enumerate(texts, 1)}
+    return Case((*RUN, "--models", "old"), files, ("fresh",))
+
+
 _PROMPTED = ("--set", "prompt=mine.j2")
 _AUDIT = ("scenes", "audit", "data", "--jobs", "1")
+_ASK = ("run", "questions.yaml", "--dry-run")
 
-KINDS: dict[str, tuple[float, Cases]] = {
-    "suites": (
-        14,
-        _file("bad.yaml", SUITES, ("validate", "bad.yaml"), ("run", "bad.yaml", "--dry-run")),
-    ),
-    "models": (
-        12,
-        _file("models.yaml", MODELS_FILES, ("validate", "models.yaml"), ("models",), DRY),
-    ),
-    "overrides": (
-        8,
-        st.lists(OVERRIDES, min_size=1, max_size=3).map(lambda texts: Case((*DRY, *_sets(texts)))),
+_ELSEWHERE = _TEXTS.filter(lambda text: ".." not in text and text[:1] not in ("/", "~"))
+
+KINDS: dict[str, Cases] = {
+    "suites": _file("bad.yaml", SUITES, ("validate", "bad.yaml"), ("run", "bad.yaml", "--dry-run")),
+    "models": _file("models.yaml", MODELS_FILES, ("validate", "models.yaml"), ("models",), DRY),
+    "overrides": st.lists(OVERRIDES, min_size=1, max_size=3).map(
+        lambda texts: Case((*DRY, *_sets(texts)))
     ),
     # A run whose --out was not drawn writes to results.
-    "arguments": (10, _ARGUMENTS.map(lambda args: Case(args, may_write=("fresh", "results")))),
-    "scenes": (12, _file("data/scenes.jsonl", SCENES, ("validate", "data"), _AUDIT, DRY, RUN)),
-    "questions": (
-        8,
-        _file(
-            "questions/questions.jsonl",
-            QUESTIONS,
-            ("validate", "questions"),
-            ("run", "questions.yaml", "--dry-run"),
-        ),
-    ),
-    "prompts": (8, _file("mine.j2", TEMPLATES, (*RUN, *_PROMPTED), (*DRY, *_PROMPTED))),
-    "pictures": (6, st.builds(_official, PICTURES, st.none() | CANDIDATES)),
-    "replies": (
-        6,
-        st.tuples(_REPLY_FILES, _REPLY_FILES).map(
-            lambda texts: Case(
-                (*RUN, "--models", "old"),
-                {f"replies/t{n}.json": text for n, text in enumerate(texts, 1)},
-                ("fresh",),
-            )
-        ),
-    ),
-    "places": (
-        6,
-        st.builds(
-            _place_case,
-            _PLACES | _TEXTS.filter(lambda text: ".." not in text and text[:1] not in ("/", "~")),
-            st.booleans(),
-            NOISE,
-        ),
-    ),
+    "arguments": _ARGUMENTS.map(lambda args: Case(args, may_write=("fresh", "results"))),
+    "scenes": _file("data/scenes.jsonl", SCENES, ("validate", "data"), _AUDIT, DRY, RUN),
+    "questions": _file("questions/questions.jsonl", QUESTIONS, ("validate", "questions"), _ASK),
+    "prompts": _file("mine.j2", TEMPLATES, (*RUN, *_PROMPTED), (*DRY, *_PROMPTED)),
+    "pictures": st.builds(_official, PICTURES, st.none() | CANDIDATES),
+    "replies": st.builds(_replies, _REPLY_FILES, _REPLY_FILES),
+    "places": st.builds(_place_case, _PLACES | _ELSEWHERE, st.booleans(), NOISE),
 }
-"""Cases beside a sound suite, by what is bad about them, with their share of all inputs [%]."""
+"""Cases beside a sound suite, by what is bad about them."""
+_PERCENT = dict(zip(KINDS, (14, 12, 8, 10, 12, 8, 8, 6, 6, 6), strict=True))
+"""Their shares of all inputs."""
 _OF_RUNS_PERCENT = 10
 
 _OF_RUN = {
@@ -250,15 +228,8 @@ def run_cases(root: Path) -> Cases:
             if not path.exists():
                 continue
             contents = _manifests(path) if name == "run.yaml" else _with_bad_line(path)
-            found.append(
-                _file(
-                    f"{run}/{name}",
-                    contents,
-                    *commands,
-                    may_write=(run, "fresh"),
-                    lasting=(*LASTING, *own),
-                )
-            )
+            ours = {"may_write": (run, "fresh"), "lasting": (*LASTING, *own)}
+            found.append(_file(f"{run}/{name}", contents, *commands, **ours))
     return st.one_of(found)
 
 
@@ -289,8 +260,8 @@ def _with_bad_line(path: Path) -> st.SearchStrategy[bytes]:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_bad_input(plain_bench, tallies, kind):
-    percent, cases = KINDS[kind]
-    try_cases(plain_bench, cases, percent, tallies.setdefault(kind, Counter()))
+    tally = tallies.setdefault(kind, Counter())
+    try_cases(plain_bench, KINDS[kind], _PERCENT[kind], tally)
 
 
 def test_bad_run_folder(runs_bench, ended, tallies):

@@ -13,9 +13,9 @@ from phyblock.errors import DataError
 from phyblock.making.scenes.candidates import NEEDED, make_candidates
 from phyblock.making.scenes.production import Request, draw, shares
 from phyblock.making.scenes.sketch import POSES
-from phyblock.scoring.plan import Counts, Goal, match_plan
 from phyblock.tracks.goal_blind import goal_blind_plans
 from phyblock.types import SETTINGS, Setting
+from tests.scoring.cases import plans_f1
 from tests.shipped import TASKS
 
 EVERY_LOOK = [(kind, euler) for kind in KIT_PALETTE for euler in POSES[kind[0]].values()]
@@ -114,17 +114,7 @@ def gain(tasks: Tasks, setting: Setting, repeats: bool) -> float:
     learned = goal_blind_plans(goals, sets, setting, repeats=repeats)
     every = {name: Plan(tuple(range(1, len(one) + 1))) for name, one in sets.items()}
     plain = goal_blind_plans(goals, sets, setting, [lambda _: None]) if repeats else every
-    best, least = (
-        sum(
-            (
-                match_plan(Goal(scene, offered, setting), plans[scene.id], "optimal").counts
-                for scene, offered in tasks
-            ),
-            Counts(),
-        )
-        for plans in (learned, plain)
-    )
-    return (best.f1 or 0.0) - (least.f1 or 0.0)
+    return plans_f1(goals, sets, learned, setting) - plans_f1(goals, sets, plain, setting)
 
 
 @pytest.mark.parametrize("setting", SETTINGS)

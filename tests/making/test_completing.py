@@ -29,14 +29,9 @@ GABLES = [
 def stripped(scene: Scene) -> GivenScene:
     """Return a scene as a person would write it: no more than where its blocks are."""
     blocks = [
-        {
-            "order": block.order,
-            "type": block.type,
-            "color": block.color,
-            "position": list(block.position_m),
-            "euler": list(block.euler_deg),
-        }
-        for block in scene.blocks
+        {"order": b.order, "type": b.type, "color": b.color, "position": place, "euler": turn}
+        for b in scene.blocks
+        for place, turn in [(list(b.position_m), list(b.euler_deg))]
     ]
     about = {"levels": list(scene.levels), "parents": list(scene.parents)}
     return GivenScene.model_validate({"id": scene.id, **about, "blocks": blocks})

@@ -99,15 +99,8 @@ def make_request(
     )
     messages = (Message("system", ("You assemble blocks.",)), Message("user", user))
     given = {"temperature": 0.5, "top_p": 0.9, "max_tokens": 128, **params}
-    return Request(
-        key,
-        seed,
-        messages,
-        given,
-        "prompt-1",
-        PlanSubject(SCENE, CANDIDATES),
-        track="full_planning",
-    )
+    subject = PlanSubject(SCENE, CANDIDATES)
+    return Request(key, seed, messages, given, "prompt-1", subject, track="full_planning")
 
 
 def make_model(

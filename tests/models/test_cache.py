@@ -148,17 +148,10 @@ def test_a_file_that_is_no_cache_is_one_clear_error(tmp_path, content):
     assert path.read_bytes() == content
 
 
-@pytest.mark.parametrize(
-    "content",
-    [
-        '{"text": 1',
-        "{}",
-        '{"text": "a", "usage": {}, "finish": "perhaps"}',
-        "[" * 10**5,
-        b"\xff\xfe\xfd",
-        7,
-    ],
-)
+NO_REPLIES = ("{}", '{"text": 1', '{"text": "a", "usage": {}, "finish": "perhaps"}', "[" * 10**5)
+
+
+@pytest.mark.parametrize("content", [*NO_REPLIES, b"\xff\xfe\xfd", 7])
 def test_a_row_that_is_no_reply_is_missing_and_is_overwritten(tmp_path, content):
     said: list[str] = []
     path = tmp_path / "c.sqlite"

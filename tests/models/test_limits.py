@@ -65,12 +65,7 @@ def busiest_window(starts: list[tuple[float, int]]) -> tuple[int, int]:
     return max(map(len, windows), default=0), max(map(sum, windows), default=0)
 
 
-calls = st.lists(
-    st.tuples(
-        st.floats(0, 200, allow_nan=False), st.integers(1, 100), st.floats(0, 90, allow_nan=False)
-    ),
-    max_size=40,
-)
+calls = st.lists(st.tuples(st.floats(0, 200), st.integers(1, 100), st.floats(0, 90)), max_size=40)
 
 
 @given(calls, st.integers(1, 10), st.integers(100, 500), st.integers(1, 8))
@@ -239,8 +234,8 @@ statuses = st.sampled_from([None, 408, 429, 500, 502, 503])
 @given(
     st.lists(statuses, min_size=1, max_size=8),
     st.integers(1, 12),
-    st.floats(0, 600, allow_nan=False),
-    st.floats(0, 400, allow_nan=False),
+    st.floats(0, 600),
+    st.floats(0, 400),
 )
 def test_a_request_is_given_up_when_both_number_and_time_are_over(
     found, attempts, retry_for_s, takes_s
@@ -263,7 +258,7 @@ def test_answers_that_were_paid_for_and_cannot_be_read_are_bounded_by_number_alo
     assert script.calls == 3
 
 
-@given(st.lists(st.none() | st.floats(0, 500, allow_nan=False), min_size=1, max_size=7))
+@given(st.lists(st.none() | st.floats(0, 500), min_size=1, max_size=7))
 def test_waits_keep_to_retry_after_and_to_their_bounds(wishes):
     script = Script(*(RetryableError("429", status=429, retry_after_s=wish) for wish in wishes))
     assert script.run() == "answer"

@@ -66,16 +66,18 @@ def test_a_folder_that_is_missing_or_empty_is_an_error_at_the_start(tmp_path):
         replay(tmp_path)
 
 
+KEPT = Reply(
+    text=STEPS,
+    reasoning="red",
+    usage=Usage(prompt_tokens=7, completion_tokens=5),
+    cost_usd=0.5,
+    seed_sent=False,
+)
+
+
 def record(model: str, scene: str, seed: int, **fields: object) -> str:
-    reply = Reply(
-        text=STEPS,
-        reasoning="red",
-        usage=Usage(prompt_tokens=7, completion_tokens=5),
-        cost_usd=0.5,
-        seed_sent=False,
-    ).model_dump()
     named = {"sample": f"full_planning/{model}/{scene}/s{seed}", "scene": scene}
-    whole = {"model": model, "key": scene, "seed": seed, "reply": reply, "error": None}
+    whole = {"model": model, "key": scene, "seed": seed, "reply": KEPT.model_dump(), "error": None}
     return json.dumps({**plan_record(), **named, **whole, **fields}) + "\n"
 
 
@@ -90,17 +92,9 @@ def test_a_run_of_our_own_is_matched_by_model_key_and_seed(tmp_path):
     )
     model = replay(tmp_path)
     assert not model.needs_messages
-    expected = Reply(
-        text=STEPS,
-        reasoning="red",
-        usage=Usage(prompt_tokens=7, completion_tokens=5),
-        cost_usd=0.0,
-        attempts=0,
-        seed_sent=False,
-    )
-    assert answer(model, "007", 1) == expected
-    last = answer(model, "007", 2)
-    assert last.text == "last"
+    kept = KEPT.model_copy(update={"cost_usd": 0.0, "attempts": 0})
+    assert answer(model, "007", 1) == kept
+    assert answer(model, "007", 2).text == "last"
     assert answer(model, "007", 3) is None
     assert answer(model, "008", 1) is None
     assert answer(model, "009", 1) is None

@@ -98,12 +98,7 @@ def ask_through(
 
 
 @settings(max_examples=40)
-@given(
-    st.floats(0, 30, allow_nan=False),
-    st.floats(1, 280, allow_nan=False),
-    st.floats(0.1, 20, allow_nan=False),
-    st.integers(1, 12),
-)
+@given(st.floats(0, 30), st.floats(1, 280), st.floats(0.1, 20), st.integers(1, 12))
 def test_an_outage_loses_nothing_and_costs_few_attempts(begins_s, lasts_s, takes_s, width):
     time = FakeTime()
     client = Outage(time, begins_s, begins_s + lasts_s, takes_s)
@@ -130,7 +125,7 @@ def test_a_wrong_address_stops_the_model_after_few_attempts_and_leaves_its_sampl
 
 
 @settings(max_examples=20)
-@given(st.floats(30, 60, allow_nan=False), st.integers(2, 12))
+@given(st.floats(30, 60), st.integers(2, 12))
 def test_a_server_that_has_answered_is_tried_for_as_long_as_the_policy_says(begins_s, width):
     time = FakeTime()
     client = Outage(time, begins_s, float("inf"), 5.0)

@@ -21,20 +21,13 @@ MODELS = ("alpha", "beta", "gamma")
 
 
 def records() -> list[dict[str, object]]:
-    return [
-        record(
-            model,
-            scene,
-            0,
-            [
-                score(1 + (place + n) % 4, n, 3 - (place + n) % 4),
-                score(2, n, 1, criterion="selection"),
-            ],
-            cost_usd=0.01 * (n + 1),
-        )
-        for n, model in enumerate(MODELS)
-        for place, scene in enumerate(LEVELS)
-    ]
+    made = []
+    for n, model in enumerate(MODELS):
+        for place, scene in enumerate(LEVELS):
+            right = (place + n) % 4
+            scores = [score(1 + right, n, 3 - right), score(2, n, 1, criterion="selection")]
+            made.append(record(model, scene, 0, scores, cost_usd=0.01 * (n + 1)))
+    return made
 
 
 @pytest.fixture

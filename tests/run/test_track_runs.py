@@ -142,16 +142,12 @@ def pictures_of(workspace: Workspace) -> dict[str, tuple[Question, dict[str, str
     scenes = read_builtin(workspace.root / "data")
     found = read_questions(workspace.root / "questions", scenes)
     style = PictureStyle(size_px=128)
-    return {
-        task.key: (
-            task.question,
-            {
-                picture.label: hashlib.sha256(question_png(picture, style)).hexdigest()
-                for picture in task.question.pictures
-            },
-        )
-        for task in found.tasks
-    }
+
+    def digests(question: Question) -> dict[str, str]:
+        pngs = {picture.label: question_png(picture, style) for picture in question.pictures}
+        return {label: hashlib.sha256(png).hexdigest() for label, png in pngs.items()}
+
+    return {task.key: (task.question, digests(task.question)) for task in found.tasks}
 
 
 def shown(seen: Seen) -> list[tuple[str, str]]:

@@ -3,13 +3,14 @@ worlds of scenes in which the true F1 is known.
 """
 
 import functools
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 from hypothesis import strategies as st
 
 from phyblock.domain.scene import Block, Candidate, CandidateSet, Plan, Scene
-from phyblock.scoring.plan import Floats, ratio_of
+from phyblock.scoring.plan import Counts, Floats, Goal, match_plan, ratio_of
 from phyblock.scoring.statistics import Clusters
 from phyblock.types import Setting
 
@@ -144,6 +145,18 @@ def renumbered(case: Case, data: st.DataObject) -> Case:
     candidates = CandidateSet(tuple(case.candidates.candidates[i] for i in order))
     steps = tuple(order.index(index - 1) + 1 for index in case.plan.steps)
     return Case(replace(case.scene, blocks=blocks), candidates, Plan(steps))
+
+
+def plans_f1(
+    scenes: Iterable[Scene],
+    sets: Mapping[str, CandidateSet],
+    plans: Mapping[str, Plan],
+    setting: Setting,
+) -> float:
+    """F1 of plans of several scenes, by the names of these."""
+    goals = {scene.id: Goal(scene, sets[scene.id], setting) for scene in scenes}
+    counts = (match_plan(goal, plans[name], "optimal").counts for name, goal in goals.items())
+    return sum(counts, Counts()).f1 or 0.0
 
 
 def precision_of(sums: Floats) -> Floats:

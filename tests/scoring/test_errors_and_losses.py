@@ -83,21 +83,13 @@ def test_file_order_of_blocks_changes_no_type_under_optimal(setting, case, data)
 def test_of_choices_alike_the_one_with_the_lightest_types_is_taken(first):
     # Either cube can be the one that is named, and then either arch stands; only if the turned
     # one does is the flat one, at its second naming, in no other pose than the one that is left.
-    position = (0.0, 0.0, 0.0)
-    cubes = [Block(n, "cube", "red", position, FLAT, (), 1) for n in (1, 2)]
-    blocks = (
-        cubes[first],
-        cubes[1 - first],
-        Block(3, "arch", "red", position, FLAT, (1,), 2),
-        Block(4, "arch", "red", position, TURNED, (2,), 2),
-    )
-    candidates = CandidateSet(
-        (
-            Candidate("cube", "red", FLAT),
-            Candidate("arch", "red", FLAT),
-            Candidate("arch", "red", TURNED),
-        )
-    )
+    cubes = [Block(n, "cube", "red", FLAT, FLAT, (), 1) for n in (1, 2)]
+    arches = [
+        Block(n, "arch", "red", FLAT, turn, (n - 2,), 2) for n, turn in ((3, FLAT), (4, TURNED))
+    ]
+    blocks = (cubes[first], cubes[1 - first], *arches)
+    looks = (("cube", FLAT), ("arch", FLAT), ("arch", TURNED))
+    candidates = CandidateSet(tuple(Candidate(kind, "red", turn) for kind, turn in looks))
     case = Case(Scene("s", (3,), blocks, ("s",)), candidates, Plan((1, 2, 3, 2)))
     early = "dependency_not_met"
     assert errors_of(case, "A", "optimal") == (None, early, None, early)

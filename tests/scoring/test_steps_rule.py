@@ -1,5 +1,7 @@
 """The rule of a step: what a move does to an assembly."""
 
+from operator import attrgetter
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -60,17 +62,10 @@ def test_no_valid_order_fails(source, setting, gating, orders, request):
 
 def right(case: Case, setting: Setting) -> list[int]:
     """For each block of the scene, candidates that stand for it; none is 0."""
-    attribute = "look" if setting == "A" else "kind"
+    attribute = attrgetter("look" if setting == "A" else "kind")
+    offered = [None, *map(attribute, case.candidates.candidates)]
     return [
-        next(
-            (
-                n
-                for n, candidate in enumerate(case.candidates.candidates, 1)
-                if getattr(candidate, attribute) == getattr(block, attribute)
-            ),
-            0,
-        )
-        for block in case.scene.blocks
+        offered.index(one) if one in offered else 0 for one in map(attribute, case.scene.blocks)
     ]
 
 

@@ -40,7 +40,7 @@ def designed_scene(name: str) -> Scene:
     return make_scene(name, (int(name[1]),), built(_DESIGNS[name]).blocks)
 
 
-angles_deg = st.floats(-180, 180, allow_nan=False)
+angles_deg = st.floats(-180, 180)
 eulers = st.tuples(angles_deg, angles_deg, angles_deg)
 block_types = st.sampled_from(BLOCK_TYPES)
 
@@ -85,7 +85,7 @@ def turned(blocks: list[Block], angle_deg: float, shift_m: tuple[float, float]) 
 @st.composite
 def clouds(draw: st.DrawFn) -> list[Block]:
     """One to six blocks anywhere over a square meter, in any orientation."""
-    reach = st.floats(-0.5, 0.5, allow_nan=False)
+    reach = st.floats(-0.5, 0.5)
     return [
         block(i + 1, draw(block_types), (draw(reach), draw(reach), draw(reach) + 0.6), draw(eulers))
         for i in range(draw(st.integers(1, 6)))

@@ -210,8 +210,8 @@ def test_what_stands_elsewhere_changes_no_verdict(engine):
 @settings(max_examples=40)
 @given(
     st.sampled_from(("cube", "cuboid2", "triangle", "arch", "cylinder")),
-    st.tuples(*[st.floats(-0.03, 0.03, allow_nan=False)] * 3),
-    st.floats(0.0, 90.0, allow_nan=False),
+    st.tuples(*[st.floats(-0.03, 0.03)] * 3),
+    st.floats(0.0, 90.0),
 )
 def test_voxels_know_what_two_blocks_share_nearly(kind, way_m, turn_deg):
     one = block(1, kind, (0.01, 0.02, 0.06))

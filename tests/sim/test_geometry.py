@@ -115,7 +115,7 @@ FLOATING = {
 }
 ANNOTATION_ERROR_M = 0.002
 
-shifts_m = st.floats(-0.12, 0.12, allow_nan=False)
+shifts_m = st.floats(-0.12, 0.12)
 
 
 def placed(one: Block) -> list[ConvexPiece]:

@@ -1,6 +1,6 @@
 """Answers without a model: guesses of questions, plans without the goal, picks of people."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -17,7 +17,7 @@ from phyblock.parsing.answer import parse_answer
 from phyblock.parsing.move import parse_move
 from phyblock.parsing.plan import parse_plan
 from phyblock.parsing.poses import parse_poses
-from phyblock.scoring.plan import Counts, Goal, match_plan
+from phyblock.scoring.plan import Goal
 from phyblock.sim.pictures import joined_size_px
 from phyblock.tracks.baselines import FOLDS, Folds, Guesses, majority_rule
 from phyblock.tracks.full_planning import PlanSubject, pick_plan
@@ -34,7 +34,7 @@ from phyblock.tracks.picking import Choice, Pick, Picking
 from phyblock.tracks.pose_planning import pick_poses
 from phyblock.tracks.questions import ChoiceSubject, pick_answer
 from phyblock.tracks.step_planning import StepSubject, pick_step
-from phyblock.types import Setting
+from tests.scoring.cases import plans_f1
 from tests.shipped import TASKS
 
 WORDS = ("cube", "arch", "cylinder", "cuboid", "cone", "prism")
@@ -145,14 +145,6 @@ def scene(name: str, needed: tuple[Candidate, ...], parents: tuple[str, ...] = (
     return Scene(name, (2,), blocks, parents or (name,))
 
 
-def f1(scenes: list[Scene], sets: dict[str, CandidateSet], plans, setting: Setting) -> float:
-    counts = [
-        match_plan(Goal(one, sets[one.id], setting), plans[one.id], "optimal").counts
-        for one in scenes
-    ]
-    return sum(counts, Counts()).f1 or 0.0
-
-
 @st.composite
 def drawn_sets(draw: st.DrawFn) -> tuple[list[Scene], dict[str, CandidateSet]]:
     """Scenes of one to three blocks, some of them made from others, each with a set of the kit."""
@@ -211,9 +203,9 @@ def test_a_planted_tell_is_found(setting):
     every = {name: Plan(tuple(range(1, 9))) for name in sets}
     learned = goal_blind_plans(scenes, sets, setting)
     evenly = goal_blind_plans(scenes, sets, setting, [lambda _: None])
-    assert f1(scenes, sets, learned, setting) > 0.8
-    assert f1(scenes, sets, every, setting) < 0.5
-    assert f1(scenes, sets, evenly, setting) < 0.5
+    assert plans_f1(scenes, sets, learned, setting) > 0.8
+    assert plans_f1(scenes, sets, every, setting) < 0.5
+    assert plans_f1(scenes, sets, evenly, setting) < 0.5
 
 
 @pytest.mark.parametrize("setting", ["A", "B"])
@@ -229,8 +221,8 @@ def test_areas_of_colors_tell_which_colors_are_needed(setting):
     areas = {one.id: color_areas(one, "oblique") for one in scenes}
     assert all(areas[one.id] == {one.blocks[0].color: 1.0} for one in scenes)
     seen = goal_blind_plans(scenes, sets, setting, AREA_KEYS, areas=areas)
-    assert f1(scenes, sets, seen, setting) > 0.9
-    assert f1(scenes, sets, goal_blind_plans(scenes, sets, setting), setting) < 0.6
+    assert plans_f1(scenes, sets, seen, setting) > 0.9
+    assert plans_f1(scenes, sets, goal_blind_plans(scenes, sets, setting), setting) < 0.6
 
 
 TASK = TASKS[0]
@@ -268,13 +260,10 @@ def test_an_answer_is_read_as_it_was_picked(order, options, is_ordering):
 CENTIMETERS = st.integers(-100_000, 100_000).map(lambda n: n / 100)
 
 
-@given(
-    st.lists(
-        st.tuples(st.integers(0, N - 1), st.tuples(CENTIMETERS, CENTIMETERS, CENTIMETERS)),
-        min_size=1,
-        max_size=100,
-    )
-)
+PLACED = st.tuples(st.integers(0, N - 1), st.tuples(CENTIMETERS, CENTIMETERS, CENTIMETERS))
+
+
+@given(st.lists(PLACED, min_size=1, max_size=100))
 def test_places_are_read_as_they_were_given(steps):
     picking = pick_poses(PlanSubject(TASK.scene, TASK.candidates))
     reply = picking.reply([Pick(pick, place) for pick, place in steps])
@@ -282,35 +271,23 @@ def test_places_are_read_as_they_were_given(steps):
     assert [(step.candidate - 1, step.center_cm) for step in read] == steps
 
 
-@pytest.mark.parametrize(
-    "numbers",
-    [
-        (),
-        (1, 2),
-        (1, 2, 3, 0, 0, 0),
-        (1, -1000.5, 3),
-        (1, 2, float("nan")),
-        (1, 2, float("inf")),
-        (0.125, 2, 3),
-        (10**400, 2, 3),
-    ],
-)
+NOT_NUMBERS = ((), (1, 2), (1, 2, 3, 0, 0, 0), (1, -1000.5, 3), (0.125, 2, 3), (10**400, 2, 3))
+
+
+@pytest.mark.parametrize("numbers", [*NOT_NUMBERS, (1, 2, float("nan")), (1, 2, float("inf"))])
 def test_numbers_that_are_lacking_or_not_allowed_are_refused(numbers):
     picking = pick_poses(PlanSubject(TASK.scene, TASK.candidates))
     with pytest.raises(ValueError, match=r"y within ±1000 cm with at most 2 decimals"):
         picking.reply([Pick(0, numbers)])
 
 
+def joined(picks: Sequence[Pick]) -> str:
+    return "-".join(str(pick.place) for pick in picks)
+
+
 def picking(least: int = 1, most: int = 3, *, repeats: bool = False) -> Picking:
     choices = pick_plan(PlanSubject(TASK.scene, TASK.candidates)).choices[:4]
-    return Picking(
-        choices,
-        least,
-        most,
-        repeats,
-        "step",
-        lambda picks: "-".join(str(pick.place) for pick in picks),
-    )
+    return Picking(choices, least, most, repeats, "step", joined)
 
 
 @settings(max_examples=50)
