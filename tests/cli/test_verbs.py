@@ -1,6 +1,5 @@
 """Verbs as they are called: help, `models`, `show`, and those that read a finished run."""
 
-import json
 import re
 import subprocess
 import sys
@@ -14,7 +13,7 @@ from PIL import Image
 
 from phyblock.cli.main import phyblock
 from phyblock.config.models import ModelConfig
-from phyblock.data.scenes import StoredScene, read_builtin
+from phyblock.data.scenes import read_builtin
 from phyblock.errors import SpecError, StoreError
 from phyblock.models import litellm_client
 from phyblock.models.litellm_client import known_providers
@@ -23,7 +22,7 @@ from phyblock.sim.engine import ENGINES
 from phyblock.tracks.step_planning import StepPlanning
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
-from tests.tracks.conftest import seesaw
+from tests.tracks.conftest import raw_of, seesaw
 from tests.web.factory import LEVELS, manifest, record, score, write_run
 from tests.workspace import Workspace, questions, vqa_suite, write_questions
 
@@ -145,9 +144,7 @@ REPORT = StepPlanning.report()
 @pytest.fixture(scope="module")
 def played(new_workspace: Callable[..., Workspace]) -> Workspace:
     """A run of oracle and repeat; in some of eight seeds the oracle lets the bar fall."""
-    tipping = seesaw()
-    scene = StoredScene.of(tipping.scene, tipping.candidates).as_json()
-    workspace = new_workspace(json.loads(scene))
+    workspace = new_workspace(raw_of(seesaw()))
     workspace.write_suite(
         tracks=["step_planning"],
         models=["oracle", "repeat"],

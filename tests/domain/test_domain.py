@@ -171,12 +171,9 @@ def test_sizes_volumes_and_centers_of_mass(block_type):
 BASE = Block(7, "cuboid2", "green", (0, 0, 0.0125), (0, 0, 0), (), 1)
 TOP = Block(3, "cube", "red", (0, 0, 0.05), (0, 0, 45), (7,), 2)
 SCENE = Scene("s", (1, 2), (TOP, BASE), ("s",))
+OFFERED = (("cube", "red", 0), ("cuboid2", "green", 180), ("cube", "red", 135))
 CANDIDATES = CandidateSet(
-    (
-        Candidate("cube", "red", (0, 0, 0)),
-        Candidate("cuboid2", "green", (0, 0, 180)),
-        Candidate("cube", "red", (0, 0, 135)),
-    )
+    tuple(Candidate(kind, color, (0, 0, yaw)) for kind, color, yaw in OFFERED)
 )
 
 

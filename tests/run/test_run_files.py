@@ -112,24 +112,17 @@ def test_a_run_is_on_disk_with_its_name_before_anything_is_asked(workspace, monk
     assert [path for path, _ in synced[2:]] == [folder] + [f"{folder}/records.jsonl"] * 2
 
 
-@given(
-    st.lists(
-        st.tuples(
-            st.sampled_from(["s/1", "s/2", ""]),
-            st.sampled_from(["a", "b"]),
-            st.integers(0, 8),
-            st.booleans(),
-            st.none() | st.integers(0, 8),
-        ),
-        max_size=12,
-    )
-)
+cents = st.integers(0, 8)
+samples = st.sampled_from(["s/1", "s/2", ""])
+calls = st.tuples(samples, st.sampled_from("ab"), cents, st.booleans(), st.none() | cents)
+
+
+@given(st.lists(calls, max_size=12))
 def test_a_limit_counts_every_call_once_and_one_without_an_end_in_full(calls):
     progress, expected = Progress(), dict.fromkeys("ab", 0.0)
     for number, (sample, model, most, is_ended, billed) in enumerate(calls):
-        line = Call(
-            call=number, model=model, sample=sample, key=f"k{number}", run="r", most_usd=most
-        )
+        names = {"call": number, "model": model, "sample": sample, "key": f"k{number}", "run": "r"}
+        line = Call(**names, most_usd=most)
         progress.add_call(line)
         if is_ended:
             reply = Reply(text=f"{number}")

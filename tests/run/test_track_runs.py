@@ -5,6 +5,7 @@ import json
 import re
 import shutil
 from collections import Counter
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -14,6 +15,7 @@ from PIL import Image as PillowImage
 from phyblock.data.questions import read_questions
 from phyblock.data.scenes import read_builtin
 from phyblock.domain.question import LETTERS, Question
+from phyblock.domain.scene import AssemblyTask, Candidate, CandidateSet, Scene
 from phyblock.errors import InputError, SpecError
 from phyblock.results.compare import compare_runs
 from phyblock.results.load import load_run
@@ -24,7 +26,9 @@ from phyblock.sim.question_pictures import question_png
 from tests.fork_server import Done
 from tests.servers.chassis import ISSUE_MIX, Faults, Running, Seen
 from tests.servers.openai_chat import OpenAIChat, StepAgent, said, told_history
-from tests.workspace import Raw, Workspace, call, candidates, questions, vqa_suite, write_questions
+from tests.sim.structures import counterweighted_beam
+from tests.tracks.conftest import raw_of
+from tests.workspace import Raw, Workspace, call, questions, vqa_suite, write_questions
 
 TRACKS = ["full_planning", "step_planning", "vqa"]
 FORMAT = {"answer_format": "json_schema"}
@@ -323,26 +327,12 @@ DATA = ("--set", "dataset.path=./data")
 
 def unsteady_scene() -> Raw:
     """A plank that tips off its post until the second weight is on."""
-    places = [("cube", [0, 0, 0.025], 0), ("cuboid3", [0, 0, 0.0625], 90)]
-    places += [("cube", [0, 0.07, 0.1], 0), ("cube", [0, -0.07, 0.1], 0)]
-    depends = [[0], [1], [2], [2]]
-    blocks = [
-        {
-            "order": order,
-            "type": block_type,
-            "color": "red",
-            "layer": min(order, 3),
-            "depend": depends[order - 1],
-            "position": position,
-            "euler": [0, 0, turn],
-        }
-        for order, (block_type, position, turn) in enumerate(places, 1)
-    ]
-    plank = {"type": "cuboid3", "color": "red", "euler": [0, 0, 90], "required": 1}
-    cubes = {**candidates()[0], "required": 3}
-    others = [{**one, "required": 0} for one in candidates()[1:15]]
-    named = {"id": "beam", "levels": [3], "parents": ["beam"]}
-    return {**named, "blocks": blocks, "candidates": [cubes, plank, *others]}
+    below = (((), 1), ((1,), 2), ((2,), 3), ((2,), 3))
+    beam = zip(counterweighted_beam(), below, strict=True)
+    blocks = tuple(replace(one, depend=depend, layer=layer) for one, (depend, layer) in beam)
+    looks = {one.look: Candidate(one.type, one.color, one.euler_deg) for one in blocks}
+    scene = Scene("beam", (3,), blocks, ("beam",))
+    return raw_of(AssemblyTask(scene, CandidateSet(tuple(looks.values()))))
 
 
 @pytest.mark.skipif(len(installed_engines()) < 2, reason="one engine is installed")

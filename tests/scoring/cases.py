@@ -59,14 +59,14 @@ def cases(draw: st.DrawFn, max_blocks: int = 6, max_steps: int = 8) -> Case:
     palette = draw(st.lists(kinds, min_size=1, max_size=3))
     blocks = tuple(
         Block(
-            vertex + 1,
+            order,
             *draw(st.sampled_from(palette)),
-            (0.0, 0.0, 0.0),
+            FLAT,
             (0.0, 0.0, draw(st.sampled_from(YAWS_DEG))),
             tuple(sorted(other + 1 for other in needed)),
             1,
         )
-        for vertex, needed in enumerate(edges)
+        for order, needed in enumerate(edges, 1)
     )
     pool = [
         Candidate(kind, color, (0.0, 0.0, yaw))

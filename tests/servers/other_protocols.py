@@ -80,21 +80,11 @@ class GeminiGenerate(LocalServer):
         finish = {"length": "MAX_TOKENS", "filtered": "SAFETY"}.get(ending, "STOP")
         text = "" if ending in ("length", "filtered", "blank") else seen.reply_text
         parts = [{"text": "Let me see.", "thought": True}, {"text": text}]
-        candidate = {
-            "content": {"role": "model", "parts": parts},
-            "finishReason": finish,
-            "index": 0,
-        }
-        body = {
-            "candidates": [candidate],
-            "usageMetadata": {
-                "promptTokenCount": 1000,
-                "candidatesTokenCount": 30,
-                "thoughtsTokenCount": 10,
-                "totalTokenCount": 1040,
-            },
-            "modelVersion": seen.model,
-        }
+        content = {"role": "model", "parts": parts}
+        candidate = {"content": content, "finishReason": finish, "index": 0}
+        usage = {"promptTokenCount": 1000, "candidatesTokenCount": 30, "thoughtsTokenCount": 10}
+        usage["totalTokenCount"] = sum(usage.values())
+        body = {"candidates": [candidate], "usageMetadata": usage, "modelVersion": seen.model}
         return {} if ending == "empty" else body
 
     def error(self, status: int, ending: str, message: str) -> dict[str, Any]:  # noqa: ARG002

@@ -223,6 +223,11 @@ def test_a_proof_with_any_force_changed_or_left_out_is_refused():
         assert not proves(Stands(fewer), STANDING.structure)
 
 
+def other_than(n: int) -> int:
+    """Change an index, a flag or a length to what it is not."""
+    return (not n) if isinstance(n, bool) else n + (1 if abs(n) < 9 and n else ONE // 20)
+
+
 @pytest.mark.parametrize("field", ["bodies", "contacts", "narrow"])
 def test_a_standing_that_is_not_as_its_proof_has_it_is_refused(field):
     at = STANDING.structure._fields.index(field)
@@ -230,14 +235,7 @@ def test_a_standing_that_is_not_as_its_proof_has_it_is_refused(field):
         # How high a weight is, or forces that are all upright, does not matter.
         if path[1:] == (2, 2):
             continue
-        # An index, a flag or a length: each is changed to what it is not.
-        wrong = put(
-            STANDING.structure,
-            (at, *path),
-            lambda n: (
-                (not n) if isinstance(n, bool) else n + (1 if abs(n) < 9 and n else ONE // 20)
-            ),
-        )
+        wrong = put(STANDING.structure, (at, *path), other_than)
         assert not proves(STANDING.proof, wrong), (field, path)
 
 

@@ -1,5 +1,6 @@
 """Tracks opened for tests on a suite of some fields; scenes, and who draws their pictures."""
 
+import json
 import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -10,10 +11,12 @@ import yaml
 
 from phyblock.config.suite import Suite, load_suite
 from phyblock.data.base import Dataset
+from phyblock.data.scenes import StoredScene
 from phyblock.domain.scene import AssemblyTask, Block, Candidate, CandidateSet, Scene
 from phyblock.tracks.base import open_tracks
 from phyblock.tracks.pictures import Workshop
 from tests.shipped import TASKS
+from tests.workspace import Raw
 
 
 def suite_of(**fields: Any) -> Suite:
@@ -38,6 +41,11 @@ def track_of(
     dataset = Dataset("test", Path("."), tuple(tasks))
     (track,) = open_tracks(suite, dataset, limit, shop)
     return track
+
+
+def raw_of(task: AssemblyTask) -> Raw:
+    """The line of a data set that says a task."""
+    return json.loads(StoredScene.of(task.scene, task.candidates).as_json())
 
 
 def seesaw() -> AssemblyTask:

@@ -86,27 +86,15 @@ def test_a_reply_is_judged_in_ten_modules(name, text):
 
 
 UP, OVER, ASIDE = (0.0, 0.0, 0.0), (90.0, 0.0, 0.0), (0.0, 0.0, 90.0)
-SCENE = Scene(
-    "poses",
-    (2,),
-    (
-        Block(1, "cuboid2", "red", (0, 0, 0.025), UP, (), 1),
-        Block(2, "arch", "blue", (0, 0, 0.1), UP, (1,), 2),
-        Block(3, "cube", "green", (0, 0, 0.2), UP, (2,), 3),
-    ),
-    ("poses",),
+BLOCKS = (
+    Block(1, "cuboid2", "red", (0, 0, 0.025), UP, (), 1),
+    Block(2, "arch", "blue", (0, 0, 0.1), UP, (1,), 2),
+    Block(3, "cube", "green", (0, 0, 0.2), UP, (2,), 3),
 )
-CANDIDATES = CandidateSet(
-    (
-        Candidate("cuboid2", "red", UP),
-        Candidate("cuboid2", "red", OVER),
-        Candidate("arch", "blue", ASIDE),
-        Candidate("arch", "blue", UP),
-        Candidate("cube", "green", UP),
-        Candidate("triangle", "red", UP),
-        Candidate("triangle", "red", OVER),
-    )
-)
+SCENE = Scene("poses", (2,), BLOCKS, ("poses",))
+LOOKS = (("cuboid2", "red", UP), ("cuboid2", "red", OVER), ("arch", "blue", ASIDE))
+LOOKS += (("arch", "blue", UP), ("cube", "green", UP), ("triangle", "red", UP))
+CANDIDATES = CandidateSet(tuple(Candidate(*look) for look in (*LOOKS, ("triangle", "red", OVER))))
 plans = st.lists(st.integers(-1, 9), max_size=10)
 
 
