@@ -9,7 +9,6 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from operator import truediv
 from types import SimpleNamespace
@@ -34,7 +33,7 @@ STARTS = tuple("=+-@\t\r\n")
 risky = st.text(alphabet="'=+-@\t\r\n1.a") | st.text()
 
 
-def taken_back(cell: str) -> str:
+def taken_back(cell):
     """Read a line as docs/results.md says a reader does."""
     return cell[1:] if cell.startswith("'") and cell.lstrip("'").startswith(STARTS) else cell
 
@@ -67,12 +66,12 @@ def test_what_a_server_says_steers_no_terminal(message):
     assert str(ModelError(message)).isprintable()
 
 
-def rounding(values: Iterable[Any], /, start: Any = 0) -> Any:
+def rounding(values, /, start=0):
     """`sum` as it is before Python 3.12."""
     return functools.reduce(operator.add, values, start)
 
 
-def compensating(values: Iterable[Any], /, start: Any = 0) -> Any:
+def compensating(values, /, start=0):
     """`sum` as it is from Python 3.12 on: nothing is lost of floats."""
     listed = list(values)
     if any(type(value) is float for value in listed):
@@ -88,20 +87,20 @@ def test_values_are_added_one_after_another(values):
     assert (plain_sum(values), type(plain_sum(values))) == (total, type(total))
 
 
-def texts() -> list[Any]:
+def texts():
     """Features of options' texts, by which drafts are kept and the text probe answers."""
     tasks = built_in_questions().tasks[::5]
     return [text_features(task.question.text, task.question.options) for task in tasks]
 
 
-def solids() -> list[Any]:
+def solids():
     """The overlap of two arches, which are three pieces each or more."""
     arch = [Piece(p.vertices_m, p.face_normals) for p in collision_pieces("arch")]
     turns = (euler_deg_to_matrix((7.0 * n, 11.0 * n, 13.0 * n)) for n in range(5))
     return [overlap_volume(arch, placed(arch, turn, np.full(3, 0.003))) for turn in turns]
 
 
-def fits() -> list[Any]:
+def fits():
     """Counts of how steps lie to goal blocks, as records hold them."""
     off = [PoseFit(n, 0.1 * n, 0.0, 0.0, 0.7 * n, 1 / (n + 1)) for n in range(30)]
     records: list[Any] = [SimpleNamespace(pose=SimpleNamespace(steps=off[:n])) for n in range(30)]
@@ -118,11 +117,11 @@ def test_results_are_those_of_either_sum(compute, monkeypatch):
     assert computed[0] == computed[1]
 
 
-def fail(where: str) -> None:
+def fail(where):
     raise DataError(Problem(where, "is broken"))
 
 
-def die(_: object) -> None:
+def die(_):
     os.kill(os.getpid(), signal.SIGKILL)
 
 
@@ -174,7 +173,7 @@ def test_a_program_without_a_guard_runs_once_and_takes_its_workers_with_it(tmp_p
         assert program.stdout.read() == ""
 
 
-def late(number: int) -> int:
+def late(number):
     """Return the square of a number; every third one is slow."""
     time.sleep(0.02 * (number % 3 == 0))
     return number * number
@@ -196,11 +195,11 @@ def test_answers_come_in_the_order_of_tasks(jobs, size):
 def test_shards_end_alike_at_once_or_one_after_another_and_go_on(tmp_path, at_once):
     done: list[int] = []
 
-    def counted_square(number: int) -> int:
+    def counted_square(number):
         done.append(number)
         return late(number)
 
-    def shard(number: int) -> list[list[int]]:
+    def shard(number):
         with open_workers(shards=Shards(tmp_path / "all.shards", number, 4, "squares")) as workers:
             return [list(workers.map(counted_square, range(n))) for n in (150, 1, 40)]
 

@@ -11,8 +11,7 @@ import subprocess
 import sys
 import warnings
 import zipfile
-from collections.abc import Callable, Mapping
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -35,7 +34,7 @@ Change = Callable[[list[Raw], Raw], None]
 
 
 @pytest.fixture(scope="module")
-def made(new_workspace: Callable[..., Workspace]) -> Workspace:
+def made(new_workspace):
     """A model and a baseline in three tracks, and the bundle of the run beside it."""
     workspace = new_workspace(*SCENES[:3])
     write_questions(workspace.root / "questions", questions(per_subtask=2, subtasks=SUBTASKS))
@@ -55,24 +54,22 @@ def made(new_workspace: Callable[..., Workspace]) -> Workspace:
     return workspace
 
 
-def folders(made: Workspace) -> list[Path]:
+def folders(made):
     return [made.root / "data", made.root / "questions"]
 
 
-def refused(
-    path: Path, data: list[Path], error: type[Exception] = StoreError, match: str = ""
-) -> None:
+def refused(path, data, error=StoreError, match=""):
     with pytest.raises(error, match=match), opened_bundle(path, data):
         pytest.fail("it was taken")
 
 
-def contents(made: Workspace, folder: Path) -> dict[str, bytes]:
+def contents(made, folder):
     folder.mkdir()
     unpack(made.out / "bundle.zip", folder)
     return {name: (folder / name).read_bytes() for name in MEMBERS}
 
 
-def forged(made: Workspace, folder: Path, change: Change) -> Path:
+def forged(made, folder, change):
     """A bundle whose author changed records or manifest and made the digests of them anew."""
     found = contents(made, folder)
     records = [json.loads(line) for line in found[RECORDS].splitlines()]
@@ -85,7 +82,7 @@ def forged(made: Workspace, folder: Path, change: Change) -> Path:
     return path
 
 
-def archive(*members: tuple[str | zipfile.ZipInfo, bytes]) -> bytes:
+def archive(*members):
     file = io.BytesIO()
     with warnings.catch_warnings(), zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as made:
         warnings.simplefilter("ignore")
@@ -94,7 +91,7 @@ def archive(*members: tuple[str | zipfile.ZipInfo, bytes]) -> bytes:
     return file.getvalue()
 
 
-def with_digests(files: Mapping[str, bytes], about: Raw) -> dict[str, bytes]:
+def with_digests(files, about):
     digests = {name: hex_digest(data) for name, data in files.items()}
     return {**files, ABOUT: json.dumps({**about, "files": digests}).encode()}
 
@@ -139,14 +136,14 @@ def test_samples_that_were_left_out_are_counted(made, tmp_path):
     assert "19 of 20 expected samples: the run is not complete" in done.out
 
 
-def of_track(records: list[Raw], track: str, model: str = "random") -> Raw:
+def of_track(records, track, model="random"):
     return next(r for r in records if r["track"] == track and r["model"] == model)
 
 
-def put(place: str, value: object, track: str = "", model: str = "random") -> Change:
+def put(place, value, track="", model="random"):
     """A change of one value: in the first record of a track and model, or in the manifest."""
 
-    def change(records: list[Raw], manifest: Raw) -> None:
+    def change(records, manifest):
         node: Any = of_track(records, track, model) if track else manifest
         *above, last = (int(part) if part.isdigit() else part for part in place.split("."))
         for part in above:
@@ -156,28 +153,28 @@ def put(place: str, value: object, track: str = "", model: str = "random") -> Ch
     return change
 
 
-def _score(records: list[Raw], _: Raw) -> None:
+def _score(records, _):
     score = of_track(records, "full_planning")["scores"][0]
     score["tp"], score["fp"] = score["tp"] + score["fp"], 0
 
 
-def _answer(records: list[Raw], _: Raw) -> None:
+def _answer(records, _):
     wrong = next(r for r in records if r["track"] == "vqa" and not r["answer"]["correct"])
     wrong["answer"] = {**wrong["answer"], "given": wrong["answer"]["right"], "correct": True}
 
 
-def _turn(records: list[Raw], _: Raw) -> None:
+def _turn(records, _):
     turns = (turn for r in records if r["track"] == "step_planning" for turn in r["turns"])
     next(t for t in turns if t["outcome"] != "placed").update(outcome="placed", placed=0)
 
 
-def _asked_about_less(records: list[Raw], manifest: Raw) -> None:
+def _asked_about_less(records, manifest):
     del records[1:]
     manifest["items"] = {"full_planning": 1, "vqa": 0, "step_planning": 0}
     manifest["scenes"] = 1
 
 
-def _no_models(records: list[Raw], manifest: Raw) -> None:
+def _no_models(records, manifest):
     manifest["models"] = []
     records.clear()
 
@@ -213,7 +210,7 @@ def test_what_is_not_changed_is_made_here_to_the_byte(made, tmp_path):
 
 
 def test_data_are_never_looked_for_where_a_bundle_says(made, tmp_path):
-    def change(_: list[Raw], manifest: Raw) -> None:
+    def change(_, manifest):
         manifest["dataset"] |= {"root": "/proc", "name": "../../.."}
 
     path = forged(made, tmp_path / "forged", change)
@@ -226,7 +223,7 @@ SOUND = with_digests(
 LESS = [(name, data) for name, data in SOUND.items() if name != RECORDS]
 
 
-def packed() -> bytes:
+def packed():
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w") as made:
         for name in MEMBERS:
@@ -237,20 +234,20 @@ def packed() -> bytes:
 PACKED = packed()
 
 
-def linked() -> bytes:
+def linked():
     info = zipfile.ZipInfo(RECORDS)
     info.external_attr = (stat.S_IFLNK | 0o777) << 16
     return archive(*LESS, (info, b"/etc/passwd"))
 
 
-def smaller_than_it_is() -> bytes:
+def smaller_than_it_is():
     """The list of members says that one holds less than it does."""
     size = struct.pack("<L", len(SOUND[RECORDS]))
     assert size in PACKED
     return PACKED.replace(size, struct.pack("<L", 7))
 
 
-def encrypted() -> bytes:
+def encrypted():
     data = bytearray(PACKED)
     data[data.index(b"PK\1\2") + 8] |= 1
     return bytes(data)

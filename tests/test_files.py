@@ -155,17 +155,17 @@ def test_text_is_utf_8(tmp_path):
 EPS = b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 90 90\nshowpage\n"
 
 
-def encoded(format_name: str, size: tuple[int, int] = (64, 32), mode: str = "RGB") -> bytes:
+def encoded(format_name, size=(64, 32), mode="RGB"):
     buffer = io.BytesIO()
     Image.linear_gradient("L").resize(size).convert(mode).save(buffer, format_name)
     return buffer.getvalue()
 
 
-def chunk(name: bytes, body: bytes) -> bytes:
+def chunk(name, body):
     return struct.pack(">I", len(body)) + name + body + struct.pack(">I", zlib.crc32(name + body))
 
 
-def with_chunk(png: bytes, name: bytes, body: bytes) -> bytes:
+def with_chunk(png, name, body):
     """The PNG with another chunk behind its header."""
     return png[:33] + chunk(name, body) + png[33:]
 
@@ -228,12 +228,12 @@ NAMES = ("a.csv", "b.md", "tables/c.csv", "tables/deep/d.csv", "figures/e.svg")
 some = st.sets(st.sampled_from(NAMES))
 
 
-def contents(folder: Path) -> dict[str, str]:
+def contents(folder):
     files = (path for path in folder.rglob("*") if path.is_file() and path.name != LIST)
     return {str(path.relative_to(folder)): path.read_text() for path in files}
 
 
-def put(folder: Path, names: set[str]) -> None:
+def put(folder, names):
     for name in names:
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_text("theirs")
@@ -317,7 +317,7 @@ def test_only_what_is_ours_is_removed_and_folders_that_are_empty_then(tmp_path):
     assert (tmp_path / "elsewhere" / "four").read_text() == "mine"
 
 
-def make(out: OutFolder, name: str, failure: Exception | None = None) -> None:
+def make(out, name, failure=None):
     with out.making() as folder:
         (folder / "b").write_text("ours")
         (folder / name).write_text("ours")
@@ -349,7 +349,7 @@ def test_a_full_disk_leaves_the_file_of_before(tmp_path):
         "except OSError: sys.exit(7)"
     )
 
-    def almost_full() -> None:
+    def almost_full():
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
         resource.setrlimit(resource.RLIMIT_FSIZE, (50_000, 50_000))
 

@@ -25,13 +25,13 @@ MODULES = {
 """Import names that differ from the package's."""
 
 
-def blocks(lock: str) -> list[str]:
+def blocks(lock):
     """One requirement each, with its hashes."""
     text = (ROOT / lock).read_text(encoding="utf-8").replace("\\\n", " ")
     return [line for line in text.splitlines() if line.strip()]
 
 
-def declared() -> dict[str, str]:
+def declared():
     """Every requirement in pyproject.toml by the name of its package."""
     text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
     found = re.findall(r'"([A-Za-z][A-Za-z0-9_.-]*)((?:\[[a-z,]+\])?[<>=!][^"]*)"', text)
@@ -50,7 +50,7 @@ def test_every_requirement_is_pinned_with_hashes_and_names_no_host(lock):
     assert "://" not in (ROOT / lock).read_text(encoding="utf-8")
 
 
-def pins(lock: str) -> set[str]:
+def pins(lock):
     """Versions by package, and on which Pythons where there are several."""
     whole = [block.split(" --hash")[0].strip() for block in blocks(lock)]
     several = Counter(pin.partition("==")[0] for pin in whole)

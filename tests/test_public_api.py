@@ -17,7 +17,6 @@ import phyblock
 from phyblock.api import _distinct
 from phyblock.errors import SpecError
 from phyblock.records.files import read_manifest, run_records
-from phyblock.records.record import Record
 from phyblock.tracks.pictures import Workshop
 
 NAMES = ["Episode", "PhyblockError", "Run", "Score", "Suite", "Task"]
@@ -117,7 +116,7 @@ def test_nothing_is_spent_unasked_and_a_loop_may_run(workspace, monkeypatch):
         phyblock.run_suite("quick", models=["paid"], limit=1, out=out, models_file="billed.yaml")
     assert not out.exists()
 
-    async def in_a_notebook() -> phyblock.Run:
+    async def in_a_notebook():
         return phyblock.run_suite("quick", models=["random"], limit=2, out=out)
 
     run = asyncio.run(in_a_notebook())
@@ -128,7 +127,7 @@ TRACKS = {"full_planning": "quick", "step_planning": "steps", "pose_planning": "
 JUDGED = ("parse", "scores", "counts", "outcome", "levels", "parents", "n_blocks")
 
 
-def judged(record: Record) -> dict[str, object]:
+def judged(record):
     """Return what a judgement says, without what a run adds to it."""
     fields = record.model_dump()
     for turn in fields.get("turns", ()):
@@ -191,7 +190,7 @@ def test_threads_and_processes_share_nothing():
     found = phyblock.tasks("full_planning", "images.size_px=128", levels=[1, 2], limit=6)
     reply = "Step1: Move block with index 1\nStep2: Move block with index 2"
 
-    def both(n: int) -> tuple[float, str]:
+    def both(n):
         task = found[n % len(found)]
         return task.score(reply).value, str(task.messages())
 

@@ -8,7 +8,6 @@ import sqlite3
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass
-from pathlib import Path
 
 import pytest
 import yaml
@@ -28,20 +27,20 @@ FRESH = ["run", "suite.yaml", "--out", "fresh"]
 FAKE_KEY = "sk-" + "x1" * 12
 
 
-def after(change: Callable[[Workspace], object], *args: str) -> Prepare:
+def after(change, *args):
     """Something is changed, and then this command is given."""
 
-    def prepare(workspace: Workspace) -> list[str]:
+    def prepare(workspace):
         change(workspace)
         return list(args)
 
     return prepare
 
 
-def file(name: str, content: str | bytes, *args: str) -> Prepare:
+def file(name, content, *args):
     """A file holds this, whatever it was."""
 
-    def change(workspace: Workspace) -> None:
+    def change(workspace):
         path = workspace.root / name
         path.parent.mkdir(exist_ok=True)
         path.write_bytes(content if isinstance(content, bytes) else content.encode())
@@ -49,10 +48,10 @@ def file(name: str, content: str | bytes, *args: str) -> Prepare:
     return after(change, *args)
 
 
-def lines(name: str, change: Callable[[list[str]], list[str]], *args: str) -> Prepare:
+def lines(name, change, *args):
     """The lines of a file are changed."""
 
-    def changed(workspace: Workspace) -> None:
+    def changed(workspace):
         path = workspace.root / name
         texts = change(path.read_text(encoding="utf-8").splitlines())
         path.write_text("".join(text + "\n" for text in texts), encoding="utf-8")
@@ -60,43 +59,43 @@ def lines(name: str, change: Callable[[list[str]], list[str]], *args: str) -> Pr
     return after(changed, *args)
 
 
-def suite_text(text: str) -> Prepare:
+def suite_text(text):
     """The suite is this text."""
     return file("suite.yaml", text, *RUN)
 
 
-def suite_line(line: str) -> Prepare:
+def suite_line(line):
     """The suite is sound but for one more line."""
     sound = ("name: trial", "models: [random]", "dataset: {path: ./data}")
     kept = [other for other in sound if other.split(":")[0] != line.split(":")[0]]
     return suite_text("\n".join([*kept, line, ""]))
 
 
-def options(*more: str) -> Prepare:
+def options(*more):
     """A sound suite, and these options."""
     return lambda _: [*RUN, *more]
 
 
-def command(*args: str) -> Prepare:
+def command(*args):
     """Another command."""
     return lambda _: list(args)
 
 
-def scenes_text(change: Callable[[list[str]], list[str]]) -> Prepare:
+def scenes_text(change):
     """The lines of `scenes.jsonl` are changed."""
     return lines("data/scenes.jsonl", change, *RUN)
 
 
-def second_scene(at: str, value: object) -> Prepare:
+def second_scene(at, value):
     """A value of the second scene is replaced."""
     changed = json.dumps(with_value(tower("t2", [2], ("red", "blue")), at, value))
     return scenes_text(lambda lines: [lines[0], changed, *lines[2:]])
 
 
-def template(text: str | None) -> Prepare:
+def template(text):
     """The prompt is a template with this text, or one that is not there."""
 
-    def prepare(workspace: Workspace) -> list[str]:
+    def prepare(workspace):
         if text is not None:
             (workspace.root / "mine.j2").write_text(text, encoding="utf-8")
         workspace.write_suite(models=["alpha"], prompt="mine.j2")
@@ -105,32 +104,32 @@ def template(text: str | None) -> Prepare:
     return prepare
 
 
-def template_alone(verb: str) -> Prepare:
+def template_alone(verb):
     """A template stands where a suite belongs."""
     return file("mine.j2", user_block("Build it."), verb, "mine.j2")
 
 
-def user_block(text: str) -> str:
+def user_block(text):
     """A template whose second line is `text`, in a user block."""
     return f"{{% block user %}}\n{text}\n{{% endblock %}}"
 
 
-def models_text(text: str) -> Prepare:
+def models_text(text):
     """`models.yaml` is this text."""
     return file("models.yaml", text, *FRESH)
 
 
-def png(size: tuple[int, int] = (64, 32)) -> bytes:
+def png(size=(64, 32)):
     """A small picture."""
     buffer = io.BytesIO()
     PillowImage.effect_noise(size, 50).save(buffer, "PNG")
     return buffer.getvalue()
 
 
-def pipe(name: str, *args: str) -> Prepare:
+def pipe(name, *args):
     """A pipe without a writer stands where a file belongs."""
 
-    def prepare(workspace: Workspace) -> list[str]:
+    def prepare(workspace):
         (workspace.root / name).unlink(missing_ok=True)
         os.mkfifo(workspace.root / name)
         return list(args)
@@ -138,15 +137,15 @@ def pipe(name: str, *args: str) -> Prepare:
     return prepare
 
 
-def noise(name: str, *args: str) -> Prepare:
+def noise(name, *args):
     """Ten megabytes that are no text stand in a file."""
     return file(name, bytes(range(256)) * 40_000, *args)
 
 
-def checkout(picture: bytes | None) -> Prepare:
+def checkout(picture):
     """A checkout of the official layout with one picture, or none."""
 
-    def prepare(workspace: Workspace) -> list[str]:
+    def prepare(workspace):
         root = write_checkout(workspace.root / "official", {**sound_scene(), "id": "000"})
         if picture is not None:
             folder = root / "data" / "SCENEs_400_Goal_and_Cand_Imgs_resized"
@@ -162,10 +161,10 @@ def checkout(picture: bytes | None) -> Prepare:
     return prepare
 
 
-def recording(content: str | None) -> Prepare:
+def recording(content):
     """A model of recorded replies with this file, or with no folder at all."""
 
-    def prepare(workspace: Workspace) -> list[str]:
+    def prepare(workspace):
         if content is not None:
             folder = workspace.root / "replies"
             folder.mkdir()
@@ -177,17 +176,17 @@ def recording(content: str | None) -> Prepare:
     return prepare
 
 
-def broken_record(change: Callable[[str], str], *args: str) -> Prepare:
+def broken_record(change, *args):
     """The second of the finished run's records is changed."""
     return lines(
         "out/records.jsonl", lambda them: [them[0], change(them[1]), *them[2:]], *(args or RUN)
     )
 
 
-def without_field(field: str) -> Callable[[str], str]:
+def without_field(field):
     """A record's line without one of its fields."""
 
-    def change(line: str) -> str:
+    def change(line):
         record: Raw = json.loads(line)
         del record[field]
         return json.dumps(record)
@@ -195,10 +194,10 @@ def without_field(field: str) -> Callable[[str], str]:
     return change
 
 
-def manifest_without(field: str, *args: str) -> Prepare:
+def manifest_without(field, *args):
     """The finished run's manifest lacks a field."""
 
-    def change(workspace: Workspace) -> None:
+    def change(workspace):
         manifest: Raw = yaml.safe_load((workspace.out / "run.yaml").read_text(encoding="utf-8"))
         del manifest[field]
         workspace.write_yaml("out/run.yaml", manifest)
@@ -206,12 +205,12 @@ def manifest_without(field: str, *args: str) -> Prepare:
     return after(change, *args)
 
 
-def file_in_the_way(*args: str) -> Prepare:
+def file_in_the_way(*args):
     """A file `taken` stands where the command line names a folder."""
     return file("taken", "mine", *args)
 
 
-def foreign_cache(workspace: Workspace) -> None:
+def foreign_cache(workspace):
     """The reply cache is a database of another schema."""
     path = workspace.cache / "replies.sqlite"
     path.unlink()
@@ -220,7 +219,7 @@ def foreign_cache(workspace: Workspace) -> None:
         database.commit()
 
 
-def changed_colors(texts: list[str]) -> list[str]:
+def changed_colors(texts):
     """Lines of scenes with as many blocks, of another color."""
     return [
         text.replace('"red"', '"#"').replace('"blue"', '"red"').replace('"#"', '"blue"')
@@ -228,7 +227,7 @@ def changed_colors(texts: list[str]) -> list[str]:
     ]
 
 
-def many_files(workspace: Workspace) -> list[str]:
+def many_files(workspace):
     """Three files, each with a problem of its own."""
     workspace.write_yaml("bad-suite.yaml", {"name": "trial", "models": ["nobody"], "dataset": {}})
     (workspace.root / "bad-models.yaml").write_text("mine: nowhere\n", encoding="utf-8")
@@ -507,7 +506,7 @@ BAD: tuple[Bad, ...] = SUITES + OPTIONS + DATA + MODELS + FOLDERS + CACHES
 
 
 @pytest.fixture(scope="module")
-def finished(new_workspace: Callable[..., Workspace]) -> Workspace:
+def finished(new_workspace):
     """A workspace with a finished run in `out`, replies in the cache, and a server that is gone."""
     made = new_workspace()
     made.write_suite(models=["random", "alpha"])
@@ -524,7 +523,7 @@ def finished(new_workspace: Callable[..., Workspace]) -> Workspace:
 
 
 @pytest.fixture
-def copy(finished: Workspace, tmp_path: Path) -> Workspace:
+def copy(finished, tmp_path):
     made = finished.copied(tmp_path / "copy")
     # The manifest names the data by its absolute path.
     manifest = made.out / "run.yaml"

@@ -19,7 +19,7 @@ from phyblock.results.export import export_run
 from phyblock.results.load import load_run
 from phyblock.results.tables import write_tables
 from phyblock.results.text import Column, TextTable
-from phyblock.run.runner import ModelStopped, RunEvent, RunNotice, RunStarted, SampleDone
+from phyblock.run.runner import ModelStopped, RunNotice, RunStarted, SampleDone
 from tests.web.factory import LEVELS, manifest, record, score, write_run
 
 NAME = ":b: [red]x[/red]\n=2 \x1b[31m\u202e|&\r"
@@ -30,7 +30,7 @@ GROUPS = st.sampled_from(["", "Level", "A long name"])
 
 
 @st.composite
-def tables(draw: st.DrawFn) -> TextTable:
+def tables(draw):
     columns = (
         Column("Model", is_text=True),
         *(Column(name, is_text=True) for name in draw(st.lists(WORDS, max_size=1))),
@@ -100,16 +100,16 @@ def test_no_cell_of_any_csv_is_a_formula(tmp_path):
     assert pd.read_csv(exported[0])["reply"][0] == "'-2+3+cmd|' /C calc'!A0"
 
 
-def retry(status: int | None = 429, wait_s: float = 1.0, model: str = "alpha") -> ModelEvent:
+def retry(status=429, wait_s=1.0, model="alpha"):
     text = f"HTTP {status}: busy" if status else "no connection to host"
     return ModelEvent(model, "retry", text, wait_s, status=status)
 
 
-def done(model: str = "alpha", outcome: str = "ok") -> SampleDone:
+def done(model="alpha", outcome="ok"):
     return SampleDone(known_records().validate_python(record(model=model, outcome=outcome)))
 
 
-def logged(*events: tuple[float, RunEvent | None], **models: int) -> list[str]:
+def logged(*events, **models):
     """The lines that a log gets, each event at its time [s]; None is a tick of the clock."""
     now_s = 0.0
     screen = io.StringIO()
@@ -148,7 +148,7 @@ def test_no_model_has_more_than_a_line_in_ten_seconds_and_every_retry_is_counted
     counted = 0
     screen = io.StringIO()
 
-    def read() -> None:
+    def read():
         nonlocal counted
         for line in screen.getvalue().splitlines():
             if found := re.match(r"(a|b): (\d+) calls? sent again", line):

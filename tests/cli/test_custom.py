@@ -1,22 +1,19 @@
 """What users bring: prompts beside the suite, modules that add to tracks."""
 
-from pathlib import Path
-
 import pytest
 
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
-from tests.workspace import Workspace
 
 
 @pytest.fixture
-def asked(workspace: Workspace) -> Workspace:
+def asked(workspace):
     workspace.write_suite(models=["alpha"], seeds=[0])
     (workspace.root / "prompts").mkdir()
     return workspace
 
 
-def own_prompt(workspace: Workspace) -> Path:
+def own_prompt(workspace):
     return workspace.root / "prompts" / "full_planning.j2"
 
 
@@ -85,7 +82,7 @@ add_baseline("full_planning", "backwards", backwards)
 
 
 @pytest.fixture
-def suite(workspace: Workspace) -> Workspace:
+def suite(workspace):
     workspace.write_suite(models=["backwards"])
     (workspace.root / "mine.py").write_text(PLUGIN, encoding="utf-8")
     return workspace

@@ -18,12 +18,12 @@ from phyblock.web.report import write_report
 from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.web.factory import LEVELS, manifest, record, score, write_run
-from tests.workspace import COMMAND, Workspace, invoked
+from tests.workspace import COMMAND, invoked
 
 Prepare = Callable[[Path], None]
 
 
-def in_terminal(workspace: Workspace, answer: str, *args: str) -> tuple[int, str]:
+def in_terminal(workspace, answer, *args):
     """Run with a terminal of 120 columns, and type `answer` first; exit code and screen. No page,
     which takes seconds.
     """
@@ -46,7 +46,7 @@ def in_terminal(workspace: Workspace, answer: str, *args: str) -> tuple[int, str
     return process.returncode, screen.decode()
 
 
-def _read(master: int) -> bytes:
+def _read(master):
     try:
         return os.read(master, 65536)
     except OSError:  # Linux says EIO when the other side is closed.
@@ -54,7 +54,7 @@ def _read(master: int) -> bytes:
 
 
 @pytest.fixture
-def suite(workspace: Workspace, monkeypatch: pytest.MonkeyPatch) -> Workspace:
+def suite(workspace, monkeypatch):
     workspace.write_suite()
     for name, value in workspace.env.items():
         monkeypatch.setenv(name, value)
@@ -73,7 +73,7 @@ def test_a_terminal_shows_bars_and_then_the_tables(suite):
     class Bracketing(OpenAIChat):
         """A model whose messages look like markup."""
 
-        def error(self, status: int, ending: str, message: str) -> dict[str, object]:
+        def error(self, status, ending, message):
             return super().error(status, ending, f"[/bold] busy [blink {message}")
 
     faults = Faults(latency_s=0.3, rate_limited=0.5, retry_after="0")
@@ -135,7 +135,7 @@ def test_the_folder_of_a_run_is_found_again_without_naming_it(suite):
     assert suite.files() == before
 
 
-def files(folder: Path) -> dict[str, bytes]:
+def files(folder):
     return {
         str(path.relative_to(folder)): b"-> " + bytes(path.readlink())
         if path.is_symlink()
@@ -145,19 +145,19 @@ def files(folder: Path) -> dict[str, bytes]:
     }
 
 
-def put(path: Path, text: str = "mine") -> None:
+def put(path, text="mine"):
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text)
 
 
-def link(path: Path) -> None:
+def link(path):
     """A link at `path` to a folder of the user's beside the out folder."""
     put(path.parent.parent / "elsewhere" / "ch1" / "thesis.tex")
     path.symlink_to(path.parent.parent / "elsewhere", target_is_directory=True)
 
 
 @pytest.fixture
-def finished(tmp_path: Path) -> Path:
+def finished(tmp_path):
     """A run folder with records, begun by this version."""
     records = [record(scene=scene, scores=[score(1, 1, 1)]) for scene in LEVELS]
     folder = write_run(tmp_path / "run", records, manifest(models=["alpha"], seeds=[0]))
@@ -278,7 +278,7 @@ def test_a_verb_writes_over_its_own_files_and_no_others(tmp_path, verb):
     assert set(files(tmp_path / "theirs")) <= {name, LIST}
 
 
-def refused(workspace: Workspace, output: int, *words: str | bytes) -> tuple[int, str]:
+def refused(workspace, output, *words):
     done = subprocess.run(
         [*COMMAND, *words],
         cwd=workspace.root,
@@ -301,7 +301,7 @@ def test_output_that_nobody_takes_is_no_traceback(suite):
 
 
 def test_reports_that_are_written_at_once_all_come_to_their_end(finished):
-    def write(_: int) -> Path:
+    def write(_):
         return write_report(write_tables(finished))
 
     with ThreadPoolExecutor(4) as pool:

@@ -3,12 +3,11 @@
 import re
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import click
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import CliRunner
 from PIL import Image
 
 from phyblock.cli.main import phyblock
@@ -24,7 +23,7 @@ from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.tracks.conftest import raw_of, seesaw
 from tests.web.factory import LEVELS, manifest, record, score, write_run
-from tests.workspace import Workspace, questions, vqa_suite, write_questions
+from tests.workspace import questions, vqa_suite, write_questions
 
 VERBS = tuple(phyblock.list_commands(None))
 CALLS = re.compile(rf"\bphyblock ((?:{'|'.join(VERBS)})\b[^\n`;|&>\"#]*)")
@@ -42,7 +41,7 @@ for words in sys.argv[1:]:
 PACKAGES = '\nsys.stderr.write(" ".join({name.split(".")[0] for name in sys.modules}))'
 
 
-def ran(code: str, *words: str) -> tuple[str, set[str]]:
+def ran(code, *words):
     """Return what code prints, and the packages that it imports."""
     command = [sys.executable, "-c", f"import sys\n{code}{PACKAGES}", *words]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
@@ -88,7 +87,7 @@ def test_every_option_that_messages_and_docs_name_is_there():
     assert [each for each in sorted(named) if not is_option(*each)] == []
 
 
-def is_option(verb: str, *words: str) -> bool:
+def is_option(verb, *words):
     """True if a verb, or its own verb that the next word names, has the option that ends it."""
     context = click.Context(phyblock)
     command = phyblock.get_command(context, verb)
@@ -142,7 +141,7 @@ REPORT = StepPlanning.report()
 
 
 @pytest.fixture(scope="module")
-def played(new_workspace: Callable[..., Workspace]) -> Workspace:
+def played(new_workspace):
     """A run of oracle and repeat; in some of eight seeds the oracle lets the bar fall."""
     workspace = new_workspace(raw_of(seesaw()))
     workspace.write_suite(
@@ -214,7 +213,7 @@ def test_an_answer_is_shown_with_the_right_one(workspace):
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
+def folder(tmp_path):
     records = [
         record(model, scene, seed, [score(tp, 4 - tp, 4 - tp), score(tp, 0, 1, setting="B")])
         for model, tp in (("alpha", 4), ("beta", 1))
@@ -225,7 +224,7 @@ def folder(tmp_path: Path) -> Path:
     return write_run(tmp_path / "run", records, facts)
 
 
-def call(*words: str | Path) -> Result:
+def call(*words):
     return CliRunner().invoke(phyblock, [str(word) for word in words], catch_exceptions=False)
 
 

@@ -2,7 +2,6 @@
 
 import contextlib
 import json
-from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
@@ -26,7 +25,7 @@ from tests.fuzz.strategies import MODELS_FILES
 BAD = table("bad_models.yaml")
 
 
-def load(folder: Path, text: str) -> dict[str, ModelConfig]:
+def load(folder, text):
     path = folder / "m.yaml"
     path.write_text(text, encoding="utf-8")
     return load_models(path)

@@ -7,7 +7,6 @@ import re
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
 from hypothesis import given
@@ -118,7 +117,7 @@ def test_the_committed_schemas_are_those_of_the_models(tmp_path):
         assert made_now == (SCHEMAS / name).read_bytes(), "run python -m tests.documents"
 
 
-def _properties(schema: Any) -> list[tuple[str, dict[str, Any]]]:
+def _properties(schema):
     found = []
     for definition in (schema, *schema.get("$defs", {}).values()):
         found += list(definition.get("properties", {}).items())

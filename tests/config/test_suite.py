@@ -5,15 +5,13 @@ import copy
 import json
 import re
 from math import prod
-from pathlib import Path
-from typing import Any
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from phyblock.config.suite import FACTORS, REPEAT, Suite, Variant, VarySpec, load_suite, suite_model
+from phyblock.config.suite import FACTORS, REPEAT, Variant, VarySpec, load_suite, suite_model
 from phyblock.config.yaml import dump_yaml
 from phyblock.errors import SpecError
 from phyblock.files import bundled
@@ -43,14 +41,14 @@ def test_many_problems_are_reported_in_part(tmp_path):
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("suites")
     (folder / "official").mkdir()
     (folder / "brief.j2").write_text("{% block user %}go{% endblock %}", encoding="utf-8")
     return folder
 
 
-def load(folder: Path, text: str, *overrides: str) -> Suite:
+def load(folder, text, *overrides):
     path = folder / "s.yaml"
     path.write_text(text, encoding="utf-8")
     return load_suite(path, overrides)
@@ -87,7 +85,7 @@ CHANGES = st.one_of(
 )
 
 
-def outcome(folder: Path, raw: dict[str, Any], *overrides: str) -> object:
+def outcome(folder, raw, *overrides):
     """The suite, or the set of what is wrong with which field."""
     try:
         return load(folder, json.dumps(raw), *overrides).model_dump()
@@ -130,7 +128,7 @@ def test_a_suite_made_in_python_obeys_the_rules_between_fields():
         SUITE_MODEL.model_validate({"name": "s", "models": "recorded"})
 
 
-def levels(*values: Any) -> st.SearchStrategy[tuple[Any, ...]]:
+def levels(*values):
     some = st.permutations(values).flatmap(
         lambda order: st.integers(2, len(order)).map(lambda n: tuple(order[:n]))
     )

@@ -21,7 +21,7 @@ TEXT = st.text(st.characters(exclude_characters="\x7f", exclude_categories=["Cs"
 KEYS = TEXT.filter(lambda text: len(text) <= 80)
 
 
-def values(texts: st.SearchStrategy[str]) -> st.SearchStrategy[object]:
+def values(texts):
     numbers = st.integers(-(10**199), 10**199) | st.floats(allow_nan=False, allow_infinity=False)
     return st.recursive(
         st.none() | st.booleans() | numbers | texts,

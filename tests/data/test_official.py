@@ -4,15 +4,12 @@ import json
 import os
 from collections import Counter
 from datetime import date
-from pathlib import Path
-from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
-from phyblock.data.base import Dataset
 from phyblock.data.official import (
     match_published,
     official_prompt,
@@ -21,28 +18,28 @@ from phyblock.data.official import (
     recorded_models,
 )
 from phyblock.data.scenes import read_builtin
-from phyblock.errors import DataError, Problem
+from phyblock.errors import DataError
 from phyblock.results.paper import published_table
 from tests.data.broken import Raw, sound_scene, with_value, write_checkout, write_scenes
 
 SCENE = {**sound_scene(), "levels": [3], "parents": ["s1"]}
 
 
-def problems_of(root: Path) -> tuple[Problem, ...]:
+def problems_of(root):
     with pytest.raises(DataError) as caught:
         read_official(root)
     return caught.value.problems
 
 
-def goal_path(root: Path) -> Path:
+def goal_path(root):
     return root / "data" / "SCENEs_400_Goal_Jsons" / "s1.json"
 
 
-def candidates_path(root: Path) -> Path:
+def candidates_path(root):
     return root / "data" / "SCENEs_400_Cand_Jsons" / "s1_16_cand_blocks.json"
 
 
-def change(path: Path, field: str, value: object) -> None:
+def change(path, field, value):
     raw = json.loads(path.read_text(encoding="utf-8"))
     changed = with_value({"root": raw}, f"root.{field}", value)["root"]
     path.write_text(json.dumps(changed), encoding="utf-8")
@@ -115,7 +112,7 @@ def test_a_folder_without_scenes_is_no_checkout(tmp_path):
     assert "checkout" in problem.allowed
 
 
-def record(root: Path, model: str, scene: str, raw: object) -> None:
+def record(root, model, scene, raw):
     folder = root / "outputs" / model
     folder.mkdir(parents=True, exist_ok=True)
     (folder / f"{scene}.json").write_text(json.dumps(raw), encoding="utf-8")
@@ -175,21 +172,21 @@ NEXT: Raw = {
 }
 
 
-def write(folder: Path, name: str, content: Any) -> Path:
+def write(folder, name, content):
     folder.mkdir(parents=True, exist_ok=True)
     text = content if isinstance(content, str) else json.dumps(content, indent=2)
     (folder / name).write_text(text, encoding="utf-8")
     return folder
 
 
-def draw(folder: Path, *names: str) -> None:
+def draw(folder, *names):
     for name in names:
         path = folder / "images" / name
         path.parent.mkdir(parents=True, exist_ok=True)
         Image.new("RGB", (8, 8), "red").save(path)
 
 
-def problems(folder: Path, towers: Dataset) -> list[str]:
+def problems(folder, towers):
     with pytest.raises(DataError) as caught:
         read_official_questions(folder, towers)
     return [str(problem) for problem in caught.value.problems]
@@ -313,7 +310,7 @@ def test_case_and_separators_change_nothing(name, data):
     assert match_published(other) == match_published(name)
 
 
-def _cases(char: str) -> st.SearchStrategy[str]:
+def _cases(char):
     return st.sampled_from([char.lower(), char.upper()])
 
 

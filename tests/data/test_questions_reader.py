@@ -2,13 +2,11 @@
 
 import contextlib
 import copy
-from pathlib import Path
 from typing import Any
 
 import pytest
 from hypothesis import given, settings
 
-from phyblock.data.base import Dataset, QuestionTask
 from phyblock.data.questions import read_questions
 from phyblock.data.scenes import read_builtin
 from phyblock.domain.question import Mark
@@ -34,16 +32,16 @@ QUESTION: dict[str, Any] = {
 
 
 @pytest.fixture
-def scenes(tmp_path: Path) -> Dataset:
+def scenes(tmp_path):
     return read_builtin(write_scenes(tmp_path, sound_scene()))
 
 
-def write(folder: Path, *questions: Any) -> Path:
+def write(folder, *questions):
     folder.mkdir(exist_ok=True)
     return write_lines(folder / "questions.jsonl", questions).parent
 
 
-def read_one(folder: Path, scenes: Dataset, question: Any) -> QuestionTask:
+def read_one(folder, scenes, question):
     (task,) = read_questions(write(folder, question), scenes).tasks
     return task
 

@@ -3,7 +3,6 @@
 import contextlib
 import json
 import os
-from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
@@ -20,8 +19,8 @@ from phyblock.domain.scene import (
     CandidateSet,
     Scene,
 )
-from phyblock.errors import DataError, Problem
-from tests.data.broken import Raw, sound_scene, with_value, without, write_scenes
+from phyblock.errors import DataError
+from tests.data.broken import sound_scene, with_value, without, write_scenes
 from tests.fuzz.strategies import CANDIDATES, SCENES
 
 SCENE = sound_scene()
@@ -31,7 +30,7 @@ ANGLES = st.sampled_from([0.0, 45.0, 90.0, 180.0, 270.0, -90.0, 12.5])
 NAMES = st.from_regex(r"\A[A-Za-z0-9][A-Za-z0-9._-]{0,20}\Z")
 
 
-def problems_of(folder: Path) -> tuple[Problem, ...]:
+def problems_of(folder):
     with pytest.raises(DataError) as caught:
         read_builtin(folder)
     return caught.value.problems
@@ -46,7 +45,7 @@ def test_scenes_come_in_id_order_whatever_their_lines(tmp_path):
 
 
 def test_the_digest_tells_scenes_apart_but_not_spellings_of_one(tmp_path):
-    def digest(scene: Raw) -> str:
+    def digest(scene):
         return read_builtin(write_scenes(tmp_path, scene)).sha256
 
     same = with_value(SCENE, "blocks.0.position", [-0.0, 0.0, 25e-3])
@@ -219,7 +218,7 @@ def test_a_missing_file_and_a_folder_in_its_place_are_named(tmp_path):
 
 
 @st.composite
-def tasks(draw: st.DrawFn) -> AssemblyTask:
+def tasks(draw):
     """Any valid scene, with the candidates it needs and some that it does not."""
     n = draw(st.integers(1, 8))
     blocks: list[Block] = []

@@ -12,7 +12,7 @@ import pytest
 
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
-from tests.workspace import Workspace, csv_rows
+from tests.workspace import csv_rows
 
 DOCS = Path(__file__).parents[2] / "docs"
 ADDRESS = "http://localhost:8000"
@@ -20,7 +20,7 @@ ADDRESS = "http://localhost:8000"
 _FENCE = re.compile(r'^```(\w+)(?: title="([^"]+)")?\n(.*?)^```$', re.M | re.S)
 
 
-def follow(text: str, workspace: Workspace, url: str = ADDRESS) -> str:
+def follow(text, workspace, url=ADDRESS):
     """Do what a text says; return what its commands printed.
 
     Blocks with a title are files, added to those that are there; `sh` blocks are commands. Others,
@@ -137,7 +137,7 @@ def test_a_plugin_is_in_tables_and_on_the_page(section, workspace):
     assert word in page_of(run)
 
 
-def page_of(run: Path) -> str:
+def page_of(run):
     """Return the report with the data that it loads, unpacked."""
     scripts = "".join(file.read_text(encoding="utf-8") for file in (run / "report").rglob("*.js"))
     packed = re.findall(r"^phyblockTake\('[^']*','[^']*','([^']*)'\)$", scripts, re.M)

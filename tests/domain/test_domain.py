@@ -31,16 +31,16 @@ GRID_EULERS = st.tuples(*[st.sampled_from([-90, 0, 30, 45, 60, 90, 120, 180, 270
 TYPES = st.sampled_from(BLOCK_TYPES)
 
 
-def half_disc(radius: float, segments: int) -> list[tuple[float, float]]:
+def half_disc(radius, segments):
     angles = [math.pi * i / segments for i in range(segments + 1)]
     return [(radius * math.cos(angle), radius * math.sin(angle)) for angle in angles]
 
 
-def extruded(profile_yz: list[tuple[float, float]]) -> NDArray[np.float64]:
+def extruded(profile_yz):
     return np.array([(x, y, z) for x in (-0.025, 0.025) for y, z in profile_yz])
 
 
-def box(x: float, y: float, z: float) -> NDArray[np.float64]:
+def box(x, y, z):
     return np.array(list(itertools.product((-x, x), (-y, y), (-z, z))))
 
 
@@ -67,13 +67,13 @@ VERTICES: dict[BlockType, NDArray[np.float64]] = {
 }
 
 
-def looks_alike(block_type: BlockType, one: Rotation, other: Rotation) -> bool:
+def looks_alike(block_type, one, other):
     a, b = one.apply(VERTICES[block_type]), other.apply(VERTICES[block_type])
     distance_m = np.linalg.norm(a[:, None] - b[None], axis=2)
     return bool(distance_m.min(axis=0).max() < 1e-5 and distance_m.min(axis=1).max() < 1e-5)
 
 
-def rotation(euler_deg: Euler) -> Rotation:
+def rotation(euler_deg):
     return Rotation.from_euler("xyz", euler_deg, degrees=True)
 
 
@@ -189,7 +189,7 @@ def test_a_candidate_is_found_by_its_look_up_to_symmetry():
 SEEDS = st.integers(0, 2**32 - 1)
 
 
-def masks(graph: AOVGraph) -> st.SearchStrategy[int]:
+def masks(graph):
     return st.integers(0, (1 << len(graph)) - 1)
 
 

@@ -28,7 +28,7 @@ ROOT = Path(__file__).parents[2]
 SOME = read_data_set("phyblock-400").tasks[::20]
 
 
-def rollout(env: PhyBlockEnv, seed: int, steps: int = 30) -> list[Any]:
+def rollout(env, seed, steps=30):
     """Everything that a random agent sees."""
     observation, info = env.reset(seed=seed)
     env.action_space.seed(seed)
@@ -42,7 +42,7 @@ def rollout(env: PhyBlockEnv, seed: int, steps: int = 30) -> list[Any]:
     return seen
 
 
-def solve(env: PhyBlockEnv, info: dict[str, Any]) -> tuple[float, dict[str, Any]]:
+def solve(env, info):
     total, ended = 0.0, False
     while not ended:
         _, reward, ended, cut, info = env.step(info["right_moves"][0])
@@ -267,7 +267,7 @@ def test_an_action_that_is_no_pose_is_said():
     env.close()
 
 
-def blocks_of_code() -> list[str]:
+def blocks_of_code():
     text = (ROOT / "docs" / "tutorials" / "agent.md").read_text(encoding="utf-8")
     return re.findall(r"```python\n(.*?)```", text, re.DOTALL)
 

@@ -8,7 +8,6 @@ import math
 import random
 import tempfile
 from collections import Counter
-from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -20,17 +19,7 @@ from hypothesis import strategies as st
 from phyblock.errors import SampleError
 from phyblock.models.costs import Budget
 from phyblock.records.record import Reply
-from tests.fuzz.laws import (
-    Broken,
-    Ended,
-    LedgerAgent,
-    LedgerChat,
-    Watch,
-    asked_twice,
-    kept_in,
-    lost,
-    run_watched,
-)
+from tests.fuzz.laws import LedgerAgent, LedgerChat, Watch, asked_twice, kept_in, lost, run_watched
 from tests.fuzz.strategies import FAULTS, SEED, fuzzed
 from tests.models.factory import QUICK, ROUTES, Disk, Killing, command, make_request, run_command
 from tests.servers.batches import (
@@ -40,10 +29,10 @@ from tests.servers.batches import (
     GeminiBatches,
     OpenAIBatches,
 )
-from tests.servers.chassis import Faults, Running, Seen
+from tests.servers.chassis import Faults, Running
 from tests.servers.faults import WIRE_FAULTS
 from tests.servers.openai_chat import OpenAIChat
-from tests.workspace import SCENES, SHARED, Workspace, questions, vqa_suite, write_questions
+from tests.workspace import SCENES, SHARED, questions, vqa_suite, write_questions
 
 pytestmark = pytest.mark.fuzz
 
@@ -70,7 +59,7 @@ _QUOTA = math.ceil(FAULTS / len(_CELLS))
 """Faults that each track meets over each transport."""
 
 
-def prepare(workspace: Workspace, url: str, track: str, transport: str, seeds: list[int]) -> None:
+def prepare(workspace, url, track, transport, seeds):
     write_questions(workspace.root / "questions", questions(SCENES, 4, ("SH", "OR", "VP")))
     fields: dict[str, Any] = {"transport": transport, "price": {"input": 1, "output": 1}}
     if transport == "direct":  # by two addresses, so that what fails at one is asked at the other
@@ -81,7 +70,7 @@ def prepare(workspace: Workspace, url: str, track: str, transport: str, seeds: l
     workspace.write_suite(**{"images": {"size_px": 128}, **_TRACKS[track], **asked})
 
 
-def run(workspace: Workspace, *args: str) -> Ended:
+def run(workspace, *args):
     """Run the suite of a workspace, which holds the laws of commands."""
     shared = [str((workspace.cache / name).resolve()) for name in SHARED]
     watch = Watch(workspace.root, (workspace.out.name, "cache", *shared))
@@ -91,13 +80,13 @@ def run(workspace: Workspace, *args: str) -> Ended:
     return ended
 
 
-def holds(broken: Iterable[Broken]) -> None:
+def holds(broken):
     """Fail with the laws that were broken."""
     told = [f"{one.name}: {one.detail}" for one in broken]
     assert not told, "\n".join(told[:20])
 
 
-def one_round(workspace: Workspace, server: LedgerChat, track: str) -> None:
+def one_round(workspace, server, track):
     """A run with faults to its end, the same again, what was refused again, and a second run."""
     ledger = server.ledger
     first = len(ledger.entries)
@@ -183,7 +172,7 @@ failures = st.lists(st.sampled_from(["", "500", "reset", "done-reset"]), max_siz
 
 
 @st.composite
-def batch_faults(draw: st.DrawFn) -> BatchFaults:
+def batch_faults(draw):
     """Faults of four batches, one of which may be cancelled or refused, and calls about them."""
     lines = st.dictionaries(st.integers(0, ASKED - 1), endings, max_size=ASKED)
     kinds = ["upload", "create", "look", "list", "results"]
@@ -240,12 +229,12 @@ _ROUNDS = -(-FAULTS // 40)
 class Moody(OpenAIChat):
     """Counts up to ninety times the tokens that are expected, and knows what it billed."""
 
-    def __init__(self, draw: random.Random) -> None:
+    def __init__(self, draw):
         super().__init__()
         self._draw = draw
         self.billed_usd = 0.0
 
-    def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
+    def reply(self, seen, ending):
         prompt, completion = (int(10 ** self._draw.uniform(1, most)) for most in (4.4, 4.9))
         self.billed_usd += (prompt * PRICE["input"] + completion * PRICE["output"]) / 1e6
         usage = {"prompt_tokens": prompt, "completion_tokens": completion}

@@ -5,8 +5,6 @@ Each kind of case puts a bad file, argument or folder before a command.
 
 import json
 from collections import Counter
-from collections.abc import Sequence
-from pathlib import Path
 
 import pytest
 import yaml
@@ -14,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.data.broken import YAML_TEXTS, sound_scene
-from tests.fuzz.laws import Bench, Case, Fifo, Link
+from tests.fuzz.laws import Case, Fifo, Link
 from tests.fuzz.strategies import (
     CANDIDATES,
     JSON_TOKENS,
@@ -59,13 +57,7 @@ _NO_FILES = st.sampled_from(
 """What may stand where a file is expected."""
 
 
-def _file(
-    name: str,
-    contents: st.SearchStrategy[bytes],
-    *commands: tuple[str, ...],
-    may_write: tuple[str, ...] = ("fresh",),
-    lasting: tuple[str, ...] = (),
-) -> Cases:
+def _file(name, contents, *commands, may_write=("fresh",), lasting=()):
     """A command, and a file of this name that is drawn; once in ten it is no such file at all."""
     mostly = st.integers(0, 9).flatmap(lambda n: contents if n else _NO_FILES)
     return st.builds(
@@ -75,11 +67,11 @@ def _file(
     )
 
 
-def _sets(texts: Sequence[str]) -> list[str]:
+def _sets(texts):
     return [arg for text in texts for arg in ("--set", text)]
 
 
-def _place_case(place: str, is_there: bool, content: bytes) -> Case:
+def _place_case(place, is_there, content):
     """A run that is told to go somewhere, where something of the user's may be already."""
     here = place.removeprefix("~/")
     can_be_there = is_there and place[:1] not in ("", "/", "~") and len(place) < 80
@@ -136,7 +128,7 @@ _STEPS = st.sampled_from(
 )
 
 
-def _reply_with(pieces: list[str]) -> bytes:
+def _reply_with(pieces):
     message = {"role": "assistant", "content": " ".join(pieces)}
     body = {**_SOUND_REPLY, "choices": [{"finish_reason": "stop", "message": message}]}
     return json.dumps(body).encode()
@@ -147,7 +139,7 @@ _REPLY_FILES = broken(st.just(_SOUND_REPLY), JSON_TOKENS) | st.builds(
 )
 
 
-def _official(picture: bytes, candidates: bytes | None) -> Case:
+def _official(picture, candidates):
     """A checkout in the official layout with one picture and maybe broken candidates."""
     scene = {**sound_scene(), "id": "000"}
     goal = {"level": 2, "blocks": scene["blocks"]}
@@ -162,7 +154,7 @@ def _official(picture: bytes, candidates: bytes | None) -> Case:
     return Case((*RUN, *_sets(sets)), files, ("fresh",))
 
 
-def _replies(*texts: bytes) -> Case:
+def _replies(*texts):
     files = {f"replies/t{n}.json": text for n, text in enumerate(texts, 1)}
     return Case((*RUN, "--models", "old"), files, ("fresh",))
 
@@ -218,7 +210,7 @@ _GROWING = ("records.jsonl", "calls.jsonl", "prompts.jsonl")
 _IN_OUT = ("report/ch1/thesis.tex", "figures/mine.svg", "tables/mine.csv", "notes.md")
 
 
-def run_cases(root: Path) -> Cases:
+def run_cases(root):
     """Cases about the finished runs in `root`: a line of a file that grows, or the manifest."""
     found: list[Cases] = []
     for run, commands in _OF_RUN.items():
@@ -233,7 +225,7 @@ def run_cases(root: Path) -> Cases:
     return st.one_of(found)
 
 
-def _manifests(path: Path) -> st.SearchStrategy[bytes]:
+def _manifests(path):
     manifest = yaml.safe_load(path.read_text(encoding="utf-8"))
     whole = path.read_bytes()
     texts = st.sampled_from([*map(str.encode, YAML_TEXTS.values())])
@@ -246,11 +238,11 @@ def _manifests(path: Path) -> st.SearchStrategy[bytes]:
     return broken(st.just(manifest), NASTY_TOKENS) | added
 
 
-def _with_bad_line(path: Path) -> st.SearchStrategy[bytes]:
+def _with_bad_line(path):
     lines = path.read_bytes().splitlines(keepends=True)
     documents = [json.loads(line) for line in lines]
 
-    def joined(place: int, bad: bytes, ending: bytes) -> bytes:
+    def joined(place, bad, ending):
         return b"".join([*lines[:place], bad + ending, *lines[place + 1 :]])
 
     bad = broken(st.sampled_from(documents), JSON_TOKENS) | NOISE
@@ -269,13 +261,13 @@ def test_bad_run_folder(runs_bench, ended, tallies):
     try_cases(runs_bench, run_cases(ended.root), _OF_RUNS_PERCENT, tally)
 
 
-def try_cases(bench: Bench, cases: Cases, percent: float, tally: Counter[str]) -> None:
+def try_cases(bench, cases, percent, tally):
     """Draw cases, try each, and fail with all that was broken."""
     bench.tally, bench.found = tally, {}
 
     @fuzzed(percent)
     @given(case=cases)
-    def run(case: Case) -> None:
+    def run(case):
         bench.try_out(case)
 
     run()

@@ -10,7 +10,6 @@ import signal
 import sqlite3
 import time
 from collections import Counter
-from collections.abc import Sequence
 from typing import Any
 
 import pytest
@@ -19,7 +18,7 @@ from tests.fuzz.laws import Ledger, LedgerAgent, LedgerChat, kept_in
 from tests.fuzz.strategies import KILLS, SEED
 from tests.run.test_track_runs import by_sample
 from tests.servers.chassis import FAULTS, Faults, Running
-from tests.workspace import SCENES, Workspace, questions, vqa_suite, write_questions
+from tests.workspace import SCENES, questions, vqa_suite, write_questions
 
 AT_ONCE = 6
 PRICE = {"input": 10.0, "output": 100.0}
@@ -35,7 +34,7 @@ _ASKED_PER_EVENT = 12
 _LONGEST_WAIT_S = 120.0
 
 
-def on_disk(workspace: Workspace) -> set[tuple[str, str]]:
+def on_disk(workspace):
     """The replies that stand in records, turns or the cache, as the ledger names them."""
     found = kept_in(workspace.out)
     path = workspace.cache / "replies.sqlite"
@@ -47,7 +46,7 @@ def on_disk(workspace: Workspace) -> set[tuple[str, str]]:
     return found
 
 
-def counted_usd(workspace: Workspace) -> tuple[float, int]:
+def counted_usd(workspace):
     """Return the cost of a run's calls, those without an end at their most, and their number."""
     path = workspace.out / "calls.jsonl"
     lines = path.read_bytes().split(b"\n")[:-1] if path.exists() else ()
@@ -57,13 +56,7 @@ def counted_usd(workspace: Workspace) -> tuple[float, int]:
     return ended_usd + sum(call["most_usd"] for call in open_calls), len(open_calls)
 
 
-def run_until_killed(
-    workspace: Workspace,
-    servers: Sequence[Running],
-    ledger: Ledger,
-    draw: random.Random,
-    options: Sequence[str],
-) -> tuple[int, int]:
+def run_until_killed(workspace, servers, ledger, draw, options):
     """A run that is killed; of several servers some die and come back before: deaths of both."""
     deaths = 0
     with workspace.start("--yes", *options) as process:

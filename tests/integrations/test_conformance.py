@@ -12,7 +12,6 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +29,7 @@ Scores = dict[tuple[str, str], float]
 OVERRIDES = ("parser=official", "scoring.matchers=[paper]", "images.size_px=128")
 
 
-def example(heading: str) -> str:
+def example(heading):
     """Return the Python of a section of the page about integrations."""
     page = (Path(__file__).parents[2] / "docs" / "integrations.md").read_text("utf-8")
     found = re.search(rf"## {heading}\n.*?```python\n(.*?)```", page, re.DOTALL)
@@ -38,12 +37,12 @@ def example(heading: str) -> str:
 
 
 @pytest.fixture(scope="module")
-def known(official_checkout: Path) -> phyblock.Tasks:
+def known(official_checkout):
     return phyblock.tasks("full_planning", *OVERRIDES, data=official_checkout)
 
 
 @pytest.fixture(scope="module")
-def expected(official_checkout: Path, known: phyblock.Tasks) -> Scores:
+def expected(official_checkout, known):
     """F1 of every recorded reply, by the scorer alone."""
     scorers: dict[str, AssemblyScorer] = {}
     found: Scores = {}
@@ -57,7 +56,7 @@ def expected(official_checkout: Path, known: phyblock.Tasks) -> Scores:
     return found
 
 
-def check(checkout: Path, expected: Scores, score: Callable[[str, str], float]) -> None:
+def check(checkout, expected, score):
     replies = reply_texts(checkout)
     assert {name: score(name[1], text) for name, text in replies.items()} == expected
 
@@ -76,7 +75,7 @@ def test_inspect(official_checkout, known, expected):
 
     scorer = phyblock_scorer(known)
 
-    def score(key: str, text: str) -> float:
+    def score(key, text):
         output = ModelOutput.from_content("recorded", text)
         state = TaskState(ModelName("none/recorded"), key, 0, key, [], output=output)
         found = asyncio.run(scorer(state, Target("")))
@@ -150,7 +149,7 @@ def test_verifiers(official_checkout, expected):
     )
     by_key = {task.data.id: task for task in VerifiersTaskset(config)}
 
-    def score(key: str, text: str) -> float:
+    def score(key, text):
         said = MessageNode(message=vf.AssistantMessage(content=text), sampled=True)
         trace = vf.Trace.model_construct(nodes=[said])
         return asyncio.run(by_key[key].value(trace))
@@ -171,7 +170,7 @@ def test_openenv(official_checkout, known, expected):
 
     environment = PhyBlockEnvironment(known)
 
-    def score(key: str, text: str) -> float:
+    def score(key, text):
         assert environment.reset(key=key).messages
         return float(environment.step(PhyBlockAction(text=text)).reward or 0.0)
 
@@ -226,7 +225,7 @@ def test_trl(official_checkout, known, expected):
 
     worth = reward(known)
 
-    def score(key: str, text: str) -> float:
+    def score(key, text):
         (found,) = worth(completions=[[{"role": "assistant", "content": text}]], key=[key])
         return found
 

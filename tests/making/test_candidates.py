@@ -14,7 +14,7 @@ from phyblock.making.scenes.candidates import NEEDED, make_candidates
 from phyblock.making.scenes.production import Request, draw, shares
 from phyblock.making.scenes.sketch import POSES
 from phyblock.tracks.goal_blind import goal_blind_plans
-from phyblock.types import SETTINGS, Setting
+from phyblock.types import SETTINGS
 from tests.scoring.cases import plans_f1
 from tests.shipped import TASKS
 
@@ -26,7 +26,7 @@ DEVIATIONS = 4.0
 Tasks = list[tuple[Scene, CandidateSet]]
 
 
-def scene_of(looks) -> Scene:
+def scene_of(looks):
     blocks = tuple(
         Block(i, block_type, color, (0.0, 0.0, 0.0), euler, (), 1)
         for i, ((block_type, color), euler) in enumerate(looks, 1)
@@ -38,11 +38,11 @@ scenes = st.lists(st.sampled_from(EVERY_LOOK), min_size=1, max_size=16).map(scen
 
 
 @functools.cache
-def built_in() -> Tasks:
+def built_in():
     return [(task.scene, task.candidates) for task in TASKS]
 
 
-def fresh(count: int, seed: int) -> Tasks:
+def fresh(count, seed):
     """Base scenes of the grammar from another seed, in the shares of the built-in set."""
     tasks: Tasks = []
     for share in shares(count):
@@ -106,7 +106,7 @@ def test_no_place_tells_what_is_needed():
         assert abs(sum(place) / len(whole) - chance) < DEVIATIONS * spread
 
 
-def gain(tasks: Tasks, setting: Setting, repeats: bool) -> float:
+def gain(tasks, setting, repeats):
     """F1 of what is learned over that of naming every candidate once; where candidates may be
     named again, over that of naming all of them equally often.
     """

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from phyblock.domain.scene import Block, CandidateSet, Scene
+from phyblock.domain.scene import CandidateSet
 from phyblock.domain.symmetry import Symmetry
 from phyblock.making.checks import (
     AUDITED,
@@ -13,7 +13,6 @@ from phyblock.making.checks import (
     FOREIGN,
     OURS,
     VERIFIED,
-    Finding,
     SceneFacts,
     audit_scene,
     check_set,
@@ -39,28 +38,28 @@ GATE = designed_scene("l1-gate")
 OFFERED = make_candidates(GATE)
 
 
-def with_block(order: int, **changes: object) -> Scene:
+def with_block(order, **changes):
     blocks = tuple(replace(b, **changes) if b.order == order else b for b in GATE.blocks)
     return replace(GATE, blocks=blocks)
 
 
-def lifted(rise_m: float) -> Scene:
+def lifted(rise_m):
     x, y, z = GATE.blocks[2].position_m
     return with_block(3, position_m=(x, y, z + rise_m))
 
 
-def cellar() -> Scene:
+def cellar():
     """A block of cubes, the inner of which do not show."""
     cubes = [f"cube {y},{x}" for x in (-2, 0, 2) for y in (-2, 0, 2) for _ in range(2)]
     return make_scene("cellar", (4,), built("; ".join(cubes)).blocks)
 
 
-def beam() -> Scene:
+def beam():
     """It stands when finished, and falls before its second weight is there."""
     return make_scene("beam", (1,), built("cube; cuboid3:flat-y; 2 cube 2.8").blocks)
 
 
-def offering(change: object) -> SceneFacts:
+def offering(change):
     assert callable(change)
     return SceneFacts(GATE, CandidateSet(change(OFFERED.candidates)), QUICK)
 
@@ -115,7 +114,7 @@ def test_a_check_finds_its_own_fault_measured_in_units(name):
 
 
 def test_duplicates_and_orphans_of_a_set_are_found():
-    def moved(block: Block) -> Block:
+    def moved(block):
         x, y, z = block.position_m
         return replace(block, position_m=(x + 0.2, y, z))
 
@@ -155,7 +154,7 @@ def test_some_of_the_built_in_set_again(task):
     assert verify_scene((task.scene, task.candidates)) == ()
 
 
-def checks_of(findings: tuple[Finding, ...]) -> set[str]:
+def checks_of(findings):
     return {finding.check for finding in findings}
 
 
@@ -174,7 +173,7 @@ def test_the_whole_official_data(official_checkout):
     with open_workers(2) as workers:
         audits = dict(zip((s.id for s, _ in tasks), workers.map(audit_scene, tasks), strict=True))
 
-    def having(*checks: str) -> set[str]:
+    def having(*checks):
         return {name for name, found in audits.items() if checks_of(found) & set(checks)}
 
     assert having("overlap") == OVERLAPPING

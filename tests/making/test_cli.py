@@ -9,7 +9,6 @@ import subprocess
 import sys
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import click
 import pytest
@@ -33,7 +32,7 @@ scenes, vqa = partial(invoked, "scenes"), partial(invoked, "questions")
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory):
     """Three scenes that were made."""
     out = tmp_path_factory.mktemp("made") / "few"
     done = scenes("generate", "--count", 3, "--levels", 2, "--seed", 3, *ALONE, "--out", out)
@@ -152,7 +151,7 @@ def test_bad_options_are_refused(words, said, tmp_path):
 
 
 @pytest.fixture
-def data(tmp_path: Path) -> Path:
+def data(tmp_path):
     """The five towers of a workspace, and one whose middle block is lifted and misdeclared."""
     spoiled = tower("t6", [3], ("red", "blue", "green"))
     spoiled["blocks"][2]["position"][2] += 0.02
@@ -202,7 +201,7 @@ def test_render_names_views_backgrounds_and_kinds(data, tmp_path):
 
 
 @pytest.fixture(scope="module")
-def asked(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def asked(tmp_path_factory):
     """Eight questions about twelve scenes of the built-in set, which stand beside them."""
     folder = tmp_path_factory.mktemp("vqa")
     lines = bundled("benchmarks", "data", "phyblock-400", "scenes.jsonl").read_text("utf-8")
@@ -214,7 +213,7 @@ def asked(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def questions_of(folder: Path) -> list[dict[str, Any]]:
+def questions_of(folder):
     return read_lines(folder / QUESTION_LINES)
 
 
@@ -277,7 +276,7 @@ SHARES = (Share("1", 3, 1), Share("2", 4, 2), Share("3", 2, 1))
 HAS_RAY = importlib.util.find_spec("ray") is not None
 
 
-def killed_once(mark: str) -> int:
+def killed_once(mark):
     """Kill the process that works on it, but for the second time."""
     try:
         Path(mark).touch(exist_ok=False)

@@ -1,7 +1,6 @@
 """`phyblock scenes complete`: positions become a data set, or are refused with the reason."""
 
 import json
-from typing import Any
 
 import pytest
 import yaml
@@ -9,7 +8,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from phyblock.data.scenes import read_builtin
-from phyblock.domain.scene import Scene
 from phyblock.errors import DataError
 from phyblock.making.checks import verify_scene
 from phyblock.making.files import check_sums
@@ -26,7 +24,7 @@ GABLES = [
 ]
 
 
-def stripped(scene: Scene) -> GivenScene:
+def stripped(scene):
     """Return a scene as a person would write it: no more than where its blocks are."""
     blocks = [
         {"order": b.order, "type": b.type, "color": b.color, "position": place, "euler": turn}
@@ -37,7 +35,7 @@ def stripped(scene: Scene) -> GivenScene:
     return GivenScene.model_validate({"id": scene.id, **about, "blocks": blocks})
 
 
-def of(*blocks: Any, **fields: Any) -> GivenScene:
+def of(*blocks, **fields):
     return GivenScene.model_validate({"blocks": list(blocks), **fields})
 
 
@@ -58,7 +56,7 @@ def test_blocks_may_be_listed_in_any_order(order):
     assert set(deck.depend) == {1, 2}
 
 
-def moved(number: int, *by_m: float) -> list[Any]:
+def moved(number, *by_m):
     block = {**GABLES[number]}
     block["position"] = [at + by for at, by in zip(block["position"], by_m, strict=True)]
     return [*GABLES[:number], block, *GABLES[number + 1 :]]

@@ -2,7 +2,6 @@
 
 import itertools
 from collections import Counter
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
@@ -10,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from phyblock.data.scenes import read_builtin
-from phyblock.domain.blocks import SHAPES, BlockType, Color, Euler
+from phyblock.domain.blocks import SHAPES
 from phyblock.domain.question import LETTERS, Mark, QuestionPicture
 from phyblock.domain.scene import Block, Scene
 from phyblock.domain.symmetry import SYMMETRIES, turned_form
@@ -33,15 +32,7 @@ from phyblock.making.questions.relations import (
     tipped_over,
 )
 from phyblock.making.questions.sight import SHAPE_WORDS, Feature, names, resolve, resolve_one
-from phyblock.making.questions.structures import (
-    THIN_M,
-    WIDE_M,
-    Bench,
-    bench,
-    free_tops,
-    is_sure,
-    lowered,
-)
+from phyblock.making.questions.structures import THIN_M, WIDE_M, bench, free_tops, is_sure, lowered
 from phyblock.making.questions.views import ViewpointMaker
 from phyblock.making.scenes.sketch import POSES, transformed
 from phyblock.sim.balance import is_balanced
@@ -56,19 +47,11 @@ scenes = st.sampled_from(SCENES[::9])
 seeds = st.integers(0, 2**32 - 1)
 
 
-def block(
-    order: int,
-    place: tuple[float, float, float],
-    depend: tuple[int, ...] = (),
-    kind: BlockType = "cube",
-    color: Color = "red",
-    euler: Euler = (0.0, 0.0, 0.0),
-    layer: int = 0,
-) -> Block:
+def block(order, place, depend=(), kind="cube", color="red", euler=(0.0, 0.0, 0.0), layer=0):
     return Block(order, kind, color, place, euler, depend, layer or 1 + bool(depend))
 
 
-def shown(*blocks: Block, azimuth: float = 45.0) -> QuestionPicture:
+def shown(*blocks, azimuth=45.0):
     return QuestionPicture("scene", blocks, (azimuth, 22.0))
 
 
@@ -171,7 +154,7 @@ def test_a_hidden_block_is_sure_where_one_that_shows_rests_on_it_alone():
 # Structures, places, viewpoints
 
 
-def benches(weights: int, pillar_m: float, rng: np.random.Generator) -> Iterator[Bench]:
+def benches(weights, pillar_m, rng):
     """Yield a bench on a top of each scene that has one."""
     for scene in SCENES:
         if tops := free_tops(scene.blocks):
@@ -272,7 +255,7 @@ def test_options_of_viewpoints_differ_in_colors_at_one_height_alone():
 # Choices: ranks of the right option, drafts that are kept, letters
 
 
-def drawn(seed: int, n: int = 10) -> tuple[np.random.Generator, np.ndarray]:
+def drawn(seed, n=10):
     rng = np.random.default_rng(seed)
     return rng, rng.normal(size=(n, 4))
 
@@ -316,11 +299,11 @@ WORDINGS["told"] = "{text}"
 SHAPE_TEXTS = ("cube", "arch", "cylinder", "prism", "half cylinder")
 
 
-def told(base: str, text: str, options: tuple[str, ...]) -> Draft:
+def told(base, text, options):
     return Draft(Scene(base, (1,), (), (base,)), "told", options, (), {"text": text})
 
 
-def pool(count: int, odds: tuple[float, ...], seed: int) -> list[Draft]:
+def pool(count, odds, seed):
     """Drafts in which shapes are right as often as `odds` say, the more so of what is on top."""
     rng = np.random.default_rng(seed)
     made = []
@@ -334,7 +317,7 @@ def pool(count: int, odds: tuple[float, ...], seed: int) -> list[Draft]:
     return made
 
 
-def rate_off(texts: list[Draft]) -> float:
+def rate_off(texts):
     """Return the largest distance from chance of a shape that is offered."""
     right = Counter(one.options[0] for one in texts)
     offered = Counter(option for one in texts for option in one.options)

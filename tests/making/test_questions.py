@@ -8,15 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from phyblock.data.base import Dataset, QuestionSet
 from phyblock.data.questions import StoredQuestion, read_questions
 from phyblock.data.scenes import read_builtin
 from phyblock.domain.blocks import COLORS
-from phyblock.domain.question import LETTERS, SUBTASKS, Question, Subtask, rotated
+from phyblock.domain.question import LETTERS, SUBTASKS, Subtask, rotated
 from phyblock.errors import DataError, StoreError
 from phyblock.files import bundled
 from phyblock.making.files import question_card, write_questions
-from phyblock.making.questions.audit import SubtaskAudit, audit_questions, duplicates_of
+from phyblock.making.questions.audit import audit_questions, duplicates_of
 from phyblock.making.questions.dynamics import OUTCOME_TEXTS
 from phyblock.making.questions.production import MAKERS, make_questions, problem_of
 from phyblock.making.questions.sight import LEAST_PIXELS, palette
@@ -44,35 +43,33 @@ COUNT = 3
 HANGS_M = 0.004
 
 
-def made(
-    names: list[str], wanted: dict[Subtask, int], seed: int = 0, jobs: int = 1
-) -> list[Question]:
+def made(names, wanted, seed=0, jobs=1):
     with open_workers(jobs) as workers:
         return make_questions([SCENES[name] for name in names], wanted, seed, workers)
 
 
-def dynamic(jobs: int = 1) -> list[Question]:
+def dynamic(jobs=1):
     asked = ((made(list(names), {s: n}, jobs=jobs)) for s, (n, names) in ASKED.items())
     return [question for some in asked for question in some]
 
 
-def lines_of(questions: list[Question]) -> list[str]:
+def lines_of(questions):
     return [StoredQuestion.of(q, SCENES[q.scene.id]).as_json() for q in questions]
 
 
-def wrong_answer(question: Question, by: int = 1) -> Question:
+def wrong_answer(question, by=1):
     turned = question.answer[1:] + question.answer[:1]
     wrong = turned if len(turned) > 1 else ((turned[0] + by) % len(LETTERS),)
     return replace(question, answer=wrong)
 
 
 @pytest.fixture(scope="module")
-def static() -> list[Question]:
+def static():
     return made([scene.id for scene in SOME], dict.fromkeys(STATIC, COUNT))
 
 
 @pytest.fixture(scope="module")
-def pictured() -> list[Question]:
+def pictured():
     return dynamic()
 
 
@@ -152,7 +149,7 @@ def test_lines_read_back_as_the_questions(static, tmp_path):
 
 
 def test_processes_and_other_subtasks_change_nothing_and_the_seed_does():
-    def lines(seed: int, jobs: int, *subtasks: Subtask) -> list[str]:
+    def lines(seed, jobs, *subtasks):
         names = [scene.id for scene in SOME[:8]]
         return lines_of(made(names, dict.fromkeys(subtasks, COUNT), seed, jobs))
 
@@ -171,7 +168,7 @@ def test_too_few_scenes_are_told_for_all_subtasks_at_once():
 
 
 @pytest.fixture(scope="module")
-def built_in() -> QuestionSet:
+def built_in():
     return read_questions(FOLDER, DATA)
 
 
@@ -212,7 +209,7 @@ def test_places_that_no_mark_shows_are_found_out(built_in):
     assert problem_of(bare) == "no place A is marked on a block"
 
 
-def lab(rgb: tuple[int, int, int], seen_as: np.ndarray) -> np.ndarray:
+def lab(rgb, seen_as):
     """CIELAB (D65) of a color as it is seen, by a matrix of linear sRGB."""
     linear = np.clip(seen_as @ ((np.array(rgb) / 255 + 0.055) / 1.055) ** 2.4, 0, 1)
     x, y, z = np.cbrt(TO_XYZ @ linear / (0.9505, 1.0, 1.0888))
@@ -243,17 +240,17 @@ def test_colors_of_a_question_are_told_apart_by_everybody(seen_as):
 
 
 @pytest.fixture(scope="module")
-def asked(tmp_path_factory: pytest.TempPathFactory, towers: Dataset) -> list[Question]:
+def asked(tmp_path_factory, towers):
     folder = tmp_path_factory.mktemp("audited") / "questions"
     found = read_questions(write_asked(folder, asked_questions(per_subtask=8)), towers)
     return [task.question for task in found.tasks]
 
 
-def of(asked: list[Question], subtask: str) -> list[Question]:
+def of(asked, subtask):
     return [question for question in asked if question.subtask == subtask]
 
 
-def audit_of(questions: list[Question]) -> SubtaskAudit:
+def audit_of(questions):
     pytest.importorskip("sklearn")
     (audit,) = audit_questions(questions)
     return audit

@@ -10,7 +10,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from phyblock.domain.blocks import BLOCK_TYPES, KIT_PALETTE, SHAPES
-from phyblock.domain.scene import Block, Scene
+from phyblock.domain.scene import Block
 from phyblock.domain.symmetry import SYMMETRIES, canonical_form
 from phyblock.making.checks import FORM, PHYSICS, SceneFacts, check_set, findings_of
 from phyblock.making.scenes import designs, production
@@ -65,7 +65,7 @@ requests = st.builds(
 
 
 @functools.cache
-def some(group: str, count: int, palette: str = "kit") -> tuple[Request, ...]:
+def some(group, count, palette="kit"):
     found = (Request(5, palette, group, number) for number in range(200))
     return tuple(islice((request for request in found if draw(request) is not None), count))
 
@@ -114,7 +114,7 @@ def test_a_recolored_scene_is_its_parent_but_for_colors():
         assert canonical_form(varied.blocks) != canonical_form(original.blocks)
 
 
-def gray(scene: Scene) -> object:
+def gray(scene):
     return canonical_form([replace(block, color="red") for block in scene.blocks])
 
 
@@ -148,7 +148,7 @@ SMALL = (Share("1", 3, 1), Share("2", 4, 2), Share("3", 2, 1))
 
 
 @pytest.fixture(scope="module")
-def scenes() -> list[Scene]:
+def scenes():
     with open_workers(1) as workers:
         return list(Production(8, "kit", workers).scenes(SMALL))
 
@@ -239,11 +239,11 @@ poses = st.sampled_from(EVERY_POSE) | st.tuples(
 structures = st.sampled_from(TASKS[::7]).map(lambda task: task.scene.blocks)
 
 
-def block_at(kind, euler) -> Block:
+def block_at(kind, euler):
     return Block(1, kind, "red", (0.03, -0.11, 0.2), euler, (), 1)
 
 
-def apart_m(first: np.ndarray, second: np.ndarray) -> float:
+def apart_m(first, second):
     distances = np.linalg.norm(first[:, None] - second[None], axis=2)
     return float(max(distances.min(axis=0).max(), distances.min(axis=1).max()))
 

@@ -4,10 +4,7 @@ import asyncio
 import contextlib
 import itertools
 import json
-from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
 
 import pytest
 from hypothesis import given
@@ -26,7 +23,6 @@ from phyblock.models.batch import (
 from phyblock.models.batch_providers import PROVIDERS, UNREADABLE, _joined
 from phyblock.models.cache import ReplyCache
 from phyblock.models.costs import Budget
-from phyblock.models.request import Request
 from phyblock.records.record import BatchLine, Reply
 from tests.fuzz.strategies import documents
 from tests.models.factory import (
@@ -46,7 +42,6 @@ from tests.servers.batches import (
     BatchFaults,
     BatchServer,
     GeminiBatches,
-    Made,
     OpenAIBatches,
 )
 from tests.servers.chassis import Running
@@ -62,46 +57,42 @@ PRICE = {"input": 1000, "output": 1000, "batch": {"input": 500, "output": 500}}
 
 
 @pytest.fixture(params=PROTOCOLS)
-def route(request: pytest.FixtureRequest) -> str:
+def route(request):
     return request.param
 
 
 @pytest.fixture
-def disk(tmp_path: Path) -> Disk:
+def disk(tmp_path):
     return Disk(tmp_path)
 
 
-def config_at(route: str, url: str, **fields: Any) -> ModelConfig:
+def config_at(route, url, **fields):
     return ROUTES[route].config(url, batch=True, price=PRICE, **fields)
 
 
-def requests_of(count: int) -> list[Request]:
+def requests_of(count):
     return [make_request(f"{n:03d}") for n in range(count)]
 
 
 @contextlib.contextmanager
-def serving(
-    route: str, faults: BatchFaults | None = None, kind: type[BatchServer] | None = None
-) -> Iterator[tuple[BatchServer, ModelConfig]]:
+def serving(route, faults=None, kind=None):
     """A server of batches, and a model there."""
     server = (kind or SERVERS[route])(batch=faults)
     with Running(server) as running:
         yield server, config_at(route, running.url)
 
 
-def served(
-    route: str, disk: Disk, requests: Sequence[Request], faults: BatchFaults, **options: Any
-) -> tuple[BatchServer, list[Reply | Exception]]:
+def served(route, disk, requests, faults, **options):
     with serving(route, faults) as (server, config):
         return server, run_command(config, disk, requests, **options)
 
 
-def texts(ended: Sequence[Reply | Exception]) -> list[str]:
+def texts(ended):
     assert all(isinstance(one, Reply) for one in ended), ended
     return [one.text for one in ended if isinstance(one, Reply)]
 
 
-def once(server: BatchServer, count: int) -> bool:
+def once(server, count):
     return len(server.asked) == count and set(server.asked.values()) == {1}
 
 
@@ -330,7 +321,7 @@ DOCUMENTS = documents(
 
 @given(st.lists(st.tuples(keys, fates)))
 def test_a_request_is_in_the_last_batch_that_was_not_lost(batches):
-    def line(n: int, event: str, **fields: Any) -> BatchLine:
+    def line(n, event, **fields):
         told = {"batch": f"t{n}", "model": "m", "event": event, "time": "2026-11-23T10:00:00Z"}
         return BatchLine.model_validate({**told, **fields})
 
@@ -352,7 +343,7 @@ def test_a_request_is_in_the_last_batch_that_was_not_lost(batches):
 
 
 @st.composite
-def result_lines(draw: st.DrawFn) -> list[tuple[str, Any]]:
+def result_lines(draw):
     """Lines with the names of requests of this and of other batches, some of them broken."""
     names = st.integers(0, 5).map(lambda n: custom_id(Batch(TOKEN), n)) | st.sampled_from(
         ["pb0-x", "pb0--1", "pb01-1", "pb0-1-1", "pb0-", "-", "", "pb0-٣", "pb0-99999999999"]
@@ -399,7 +390,7 @@ def test_bodies_stand_in_lines_as_they_are(fields, name, body):
 
 def test_results_that_are_not_there_yet_are_not_taken_for_none(disk):
     class Late(OpenAIBatches):
-        def told(self, made: Made) -> dict[str, Any]:
+        def told(self, made):
             is_early = made.looks <= self.batch_faults.looks
             return {**super().told(made), **({"output_file_id": None} if is_early else {})}
 
@@ -414,7 +405,7 @@ def test_headers_that_requests_need_go_with_their_batch(disk):
     betas: list[str] = []
 
     class Noting(AnthropicBatches):
-        def key_of(self, request: Any) -> str:
+        def key_of(self, request):
             betas.append(request.headers.get("anthropic-beta", ""))
             return super().key_of(request)
 

@@ -51,7 +51,7 @@ configs = st.fixed_dictionaries(
 ).map(ModelConfig.model_validate)
 
 
-def what_decides(config: ModelConfig, request: Request) -> object:
+def what_decides(config, request):
     """All that may change a reply, in a form that can be compared."""
     sent = {**request.params, **config.params}
     return (
@@ -185,7 +185,7 @@ with ReplyCache(Path(sys.argv[1])) as cache:
 """
 
 
-def writer(path: Path, name: str, count: int) -> subprocess.Popen[str]:
+def writer(path, name, count):
     command = [sys.executable, "-c", WRITER, str(path), name, str(count)]
     return subprocess.Popen(
         command, stdout=subprocess.PIPE, text=True, cwd=Path(__file__).parents[2]

@@ -41,11 +41,11 @@ from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import in_a_loop
 
 
-def config(model_id: str, **fields: object) -> ModelConfig:
+def config(model_id, **fields):
     return ModelConfig(name="m", id=model_id, **fields)
 
 
-def request_of(*parts: str | Image, **params: object) -> Request:
+def request_of(*parts, **params):
     return Request("0", 0, (Message("user", parts),), params, "v", PlanSubject(SCENE, CANDIDATES))
 
 
@@ -137,7 +137,7 @@ async def test_a_budget_is_never_passed_and_stops_only_when_nothing_more_fits(li
     own = budget.of("m")
     refused: list[float] = []
 
-    async def call(most: float, share: float, steps: int) -> None:
+    async def call(most, share, steps):
         try:
             held = await own.reserve(lambda: most)
         except BudgetReachedError:
@@ -198,7 +198,7 @@ async def test_a_call_costs_no_more_than_was_held_once_a_reply_like_it_has_come(
     room = asyncio.Semaphore(width)
     longest, over_usd, under_way, answered = (0, 0), 0.0, 0, 0
 
-    async def call(tokens: tuple[int, int]) -> None:
+    async def call(tokens):
         nonlocal longest, over_usd, under_way, answered
         async with room:
             known = (0, 0)
@@ -280,7 +280,7 @@ def test_a_server_that_does_not_count_stops_within_the_limit(route, usage):
         dearest = most_usd(tariff, asked.prompt_tokens, asked.most_completion_tokens)
 
         @in_a_loop
-        async def ask_all() -> list[object]:
+        async def ask_all():
             model = make_model(config, budget=budget)
             calls = (model.ask(make_request(f"{n:03}")) for n in range(40))
             found = await asyncio.gather(*calls, return_exceptions=True)

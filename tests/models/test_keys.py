@@ -16,13 +16,13 @@ from tests.workspace import KEY_VARIABLE
 
 
 @pytest.fixture(autouse=True)
-def _no_keys(monkeypatch: pytest.MonkeyPatch) -> None:
+def _no_keys(monkeypatch):
     for name in ("OPENAI", "ANTHROPIC", "GEMINI", "GOOGLE", "DASHSCOPE", "HOSTED_VLLM", "MINE"):
         monkeypatch.delenv(f"{name}_API_KEY", raising=False)
     monkeypatch.delenv(KEY_VARIABLE)
 
 
-def config(model_id: str, **fields: object) -> ModelConfig:
+def config(model_id, **fields):
     return ModelConfig(name="m", id=model_id, **fields)
 
 

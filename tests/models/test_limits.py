@@ -29,21 +29,21 @@ from tests.workspace import in_a_loop
 class FakeTime:
     """Time that stands still while anything can run, then jumps to the next that still sleeps."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.now_s = 0.0
         self._sleepers: list[tuple[float, int, asyncio.Future[None]]] = []
         self._numbers = itertools.count()
 
     @property
-    def clock(self) -> Clock:
+    def clock(self):
         return Clock(lambda: self.now_s, self.sleep)
 
-    async def sleep(self, seconds: float) -> None:
+    async def sleep(self, seconds):
         wake: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         heapq.heappush(self._sleepers, (self.now_s + seconds, next(self._numbers), wake))
         await wake
 
-    async def run_until_done(self, *tasks: asyncio.Task[None]) -> None:
+    async def run_until_done(self, *tasks):
         ready = asyncio.get_running_loop()._ready
         while not all(task.done() for task in tasks):
             await asyncio.sleep(0)
@@ -59,7 +59,7 @@ class FakeTime:
             task.result()
 
 
-def busiest_window(starts: list[tuple[float, int]]) -> tuple[int, int]:
+def busiest_window(starts):
     """Most requests, and most tokens, in any half-open window of a minute."""
     windows = [[n for t, n in starts if start <= t < start + WINDOW_S] for start, _ in starts]
     return max(map(len, windows), default=0), max(map(sum, windows), default=0)
@@ -78,7 +78,7 @@ async def test_no_window_of_a_minute_has_more_starts_or_tokens_than_allowed(
     time = FakeTime()
     limits = Limits(width, asyncio.Semaphore(width), rpm, tpm, clock=time.clock)
 
-    async def call(at_s: float, tokens: int, takes_s: float) -> None:
+    async def call(at_s, tokens, takes_s):
         nonlocal inside
         await time.sleep(at_s)
         async with limits.slot(tokens) as started:
@@ -97,13 +97,13 @@ async def test_no_window_of_a_minute_has_more_starts_or_tokens_than_allowed(
 
 
 @in_a_loop
-async def starts_of(tpm: int, *calls: tuple[int, int]) -> list[float]:
+async def starts_of(tpm, *calls):
     """When calls start that were estimated at the first number of tokens and took the second."""
     time = FakeTime()
     limits = Limits(9, asyncio.Semaphore(9), tpm=tpm, clock=time.clock)
     starts: list[float] = []
 
-    async def call(expected: int, taken: int) -> None:
+    async def call(expected, taken):
         async with limits.slot(expected) as started:
             starts.append(time.now_s)
             limits.settle(started, taken)
@@ -128,7 +128,7 @@ async def test_a_model_waiting_for_its_minute_holds_no_place_that_another_could_
     quick = Limits(5, overall, clock=time.clock)
     finished_s = 0.0
 
-    async def call(limits: Limits) -> None:
+    async def call(limits):
         nonlocal finished_s
         async with limits.slot(0):
             await time.sleep(1)
@@ -148,7 +148,7 @@ async def test_limits_survive_those_that_give_up(plans, width):
     limits = Limits(width + 1, overall)
     inside = 0
 
-    async def hold(steps: int) -> None:
+    async def hold(steps):
         nonlocal inside
         async with limits.slot(0):
             inside += 1
@@ -174,7 +174,7 @@ async def test_limits_survive_those_that_give_up(plans, width):
 class Script:
     """Raises the given errors one by one, each after `takes_s`, then answers; sleeps are jumps."""
 
-    def __init__(self, *errors: Exception, takes_s: float = 0.0) -> None:
+    def __init__(self, *errors, takes_s=0.0):
         self.errors = list(errors)
         self.takes_s = takes_s
         self.now_s = 0.0
@@ -183,7 +183,7 @@ class Script:
         self.waits: list[float] = []
         self.told: list[float] = []
 
-    async def send(self) -> str:
+    async def send(self):
         self.calls += 1
         self.now_s += self.takes_s
         if self.errors:
@@ -191,15 +191,15 @@ class Script:
             raise self.errors.pop(0)
         return "answer"
 
-    async def sleep(self, seconds: float) -> None:
+    async def sleep(self, seconds):
         self.waits.append(seconds)
         self.now_s += seconds
 
-    def run(self, **policy: float) -> str:
+    def run(self, **policy):
         clock = Clock(lambda: self.now_s, self.sleep)
         rules = RetryPolicy(clock=clock, **policy)
 
-        async def main() -> str:
+        async def main():
             async for attempt in rules.retrying(lambda _, wait_s: self.told.append(wait_s)):
                 with attempt:
                     return await self.send()
@@ -269,7 +269,7 @@ def test_a_request_under_way_is_answered_and_a_second_cancellation_gives_it_up(
     server = ROUTES[route].server(Faults(latency_s=0.2))
     budget = Budget(100.0)
 
-    async def main(url: str) -> tuple[object, bool]:
+    async def main(url):
         config = ROUTES[route].config(url, price={"input": 1, "output": 1})
         with ReplyCache(tmp_path / "c.sqlite") as cache:
             model = make_model(config, cache=cache, budget=budget)
@@ -302,7 +302,7 @@ def test_whatever_is_waited_for_a_cancellation_ends_the_wait_and_nothing_is_sent
     server = ROUTES["direct"].server(Faults(mode=mode, retry_after="100"))
     fields = {"slot": {"max_concurrency": 1}, "minute": {"rpm": 1}}.get(where, {})
 
-    async def main(url: str) -> list[object]:
+    async def main(url):
         price = {"input": 0, "output": 1e6}
         config = ROUTES["direct"].config(url, price=price, seed="never", **fields)
         budget = Budget(200.0) if where == "budget" else None
@@ -332,7 +332,7 @@ def test_whatever_is_waited_for_a_cancellation_ends_the_wait_and_nothing_is_sent
 def test_a_bug_of_ours_is_neither_sent_again_nor_charged(monkeypatch):
     calls = 0
 
-    async def broken(*_: object, **__: object) -> None:
+    async def broken(*_, **__):
         nonlocal calls
         calls += 1
         raise KeyError("choices")
@@ -342,7 +342,7 @@ def test_a_bug_of_ours_is_neither_sent_again_nor_charged(monkeypatch):
         calls, budget = 0, Budget(100.0)
         config = route.config("http://127.0.0.1:9", price={"input": 1, "output": 1}, seed="never")
 
-        async def main() -> None:
+        async def main():
             model = make_model(config, budget=budget)  # noqa: B023
             with pytest.raises(KeyError):
                 await model.ask(make_request())

@@ -6,7 +6,7 @@ import os
 import socket
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from datetime import date
 from pathlib import Path
@@ -18,13 +18,12 @@ from aiohttp import web
 from phyblock.config.models import ModelConfig, group_names, load_models
 from phyblock.config.suite import Suite
 from phyblock.errors import ModelError, RetryableError, UnavailableError
-from phyblock.models.client import Answer, HttpClient
+from phyblock.models.client import HttpClient
 from phyblock.models.costs import map_entry
 from phyblock.models.keys import KEYLESS
 from phyblock.models.litellm_client import LitellmClient
 from phyblock.models.model import RetryPolicy
 from phyblock.models.request import Message
-from phyblock.records.record import Reply
 from phyblock.run.plan import to_config
 from tests.models.factory import ROUTES, ask, make_model, make_request, reply_of
 from tests.servers.chassis import Faults, Running
@@ -58,26 +57,26 @@ TEXT = replace(make_request(**NO_PARAMS), messages=(Message("user", ("Which bloc
 class AnyPath(OpenAIChat):
     """Answers every path alike and counts what arrives."""
 
-    def __init__(self, status: int, body: bytes) -> None:
+    def __init__(self, status, body):
         super().__init__()
         self.status, self.body = status, body
         self.hits = 0
 
-    def add_routes(self, app: web.Application) -> None:
+    def add_routes(self, app):
         app.router.add_route("*", "/{tail:.*}", self._answer)
 
-    async def _answer(self, _: web.Request) -> web.Response:
+    async def _answer(self, _):
         self.hits += 1
         return web.Response(status=self.status, body=self.body, content_type="application/json")
 
 
 @pytest.fixture
-def sends(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+def sends(monkeypatch):
     """The addresses to which our client sends."""
     found: list[str] = []
     send = HttpClient.send
 
-    async def counted(self: HttpClient, url: str, *args: Any, **fields: Any) -> Answer:
+    async def counted(self, url, *args, **fields):
         found.append(url)
         return await send(self, url, *args, **fields)
 
@@ -86,12 +85,12 @@ def sends(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 
 @pytest.fixture
-def hosts(monkeypatch: pytest.MonkeyPatch) -> set[str]:
+def hosts(monkeypatch):
     """The hosts that anything in the process looks up; none but this machine is found."""
     found: set[str] = set()
     look_up = socket.getaddrinfo
 
-    def noted(host: Any, *args: Any, **fields: Any) -> Any:
+    def noted(host, *args, **fields):
         name = host.decode() if isinstance(host, bytes) else str(host)
         if name == "127.0.0.1":
             return look_up(host, *args, **fields)
@@ -103,7 +102,7 @@ def hosts(monkeypatch: pytest.MonkeyPatch) -> set[str]:
 
 
 @pytest.fixture(autouse=True)
-def _environment(monkeypatch: pytest.MonkeyPatch) -> None:
+def _environment(monkeypatch):
     for name, value in {
         "NO_PROXY": "*",
         "AWS_EC2_METADATA_DISABLED": "true",
@@ -116,7 +115,7 @@ def _environment(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setenv(name, value)
 
 
-def answer_of(model_id: str, **fields: Any) -> Reply | ModelError | None:
+def answer_of(model_id, **fields):
     known: Mapping[str, Any] = {"seed": "never", "timeout_s": 10.0, "transport": "litellm"}
     config = ModelConfig(name="m", id=model_id, **{**known, **fields})
     (answer,) = ask(make_model(config, policy=RetryPolicy(1, 0.0)), TEXT)
@@ -152,7 +151,7 @@ def test_what_is_missing_on_this_machine_is_no_outage(monkeypatch, hosts):
     assert hosts <= {"huggingface.co"}
 
 
-def settings_of(litellm: Any) -> dict[str, object]:
+def settings_of(litellm):
     """Return what a program may have set: the module's values, its loggers and the environment."""
     kinds = (bool, int, float, str, type(None), tuple)
     found: dict[str, object] = {
@@ -168,7 +167,7 @@ def settings_of(litellm: Any) -> dict[str, object]:
     return {**found, "environment": dict(os.environ)}
 
 
-def methods() -> dict[str, object]:
+def methods():
     """The methods of the HTTP libraries that litellm and others send with."""
     import aiohttp
     import httpx
@@ -256,15 +255,15 @@ MAKERS = {
 }
 
 
-def config(name: str, spec: ModelConfig) -> ModelConfig:
+def config(name, spec):
     return to_config(name, spec, SUITE)
 
 
-def of_group(group: str) -> dict[str, ModelConfig]:
+def of_group(group):
     return {name: spec for name, spec in MODELS.items() if group in spec.groups}
 
 
-def faults(models: Mapping[str, ModelConfig]) -> Iterator[str]:
+def faults(models):
     """Return objections of litellm's map to models that their providers serve.
 
     Servers of one's own serve what they like: the map knows none of them.
@@ -330,7 +329,7 @@ def test_of_a_large_error_litellm_sees_the_beginning_alone(monkeypatch):
     sizes: list[int] = []
     after = LitellmClient._after
 
-    def noted(self: LitellmClient, error: Exception, *others: Any) -> Reply:
+    def noted(self, error, *others):
         sizes.append(len(str(error)))
         return after(self, error, *others)
 

@@ -4,7 +4,6 @@ import asyncio
 import json
 import re
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -16,7 +15,6 @@ from phyblock.domain.scene import Candidate, CandidateSet
 from phyblock.errors import DataError, RefusedError, SampleError
 from phyblock.models.client import read_raw_reply
 from phyblock.models.model import build_model
-from phyblock.models.request import Model, Request
 from phyblock.records.record import Reply, Usage
 from phyblock.tracks.full_planning import PLAN_RULES, PlanSubject
 from tests.data.broken import plan_record
@@ -26,12 +24,12 @@ from tests.models.factory import CANDIDATES, SCENE, make_request
 STEPS = "Step1: Move block with index 3"
 
 
-def replay(folder: Path, model: str = "m") -> Model:
+def replay(folder, model="m"):
     config = ModelConfig(name=model, replay=str(folder))
     return build_model(config, cache=None)
 
 
-def answer(model: Model, key: str, seed: int = 0) -> Reply | None:
+def answer(model, key, seed=0):
     return asyncio.run(model.ask(replace(make_request(key, seed), track="full_planning")))
 
 
@@ -75,7 +73,7 @@ KEPT = Reply(
 )
 
 
-def record(model: str, scene: str, seed: int, **fields: object) -> str:
+def record(model, scene, seed, **fields):
     named = {"sample": f"full_planning/{model}/{scene}/s{seed}", "scene": scene}
     whole = {"model": model, "key": scene, "seed": seed, "reply": KEPT.model_dump(), "error": None}
     return json.dumps({**plan_record(), **named, **whole, **fields}) + "\n"
@@ -109,15 +107,15 @@ def test_a_recorded_error_is_raised_again(tmp_path, kind, error):
     assert caught.value.status == 400
 
 
-def choice(message: object, finish: str = "stop") -> dict[str, object]:
+def choice(message, finish="stop"):
     return {"choices": [{"index": 0, "finish_reason": finish, "message": message}]}
 
 
-def reply(text: str, finish: Any = "unknown", reasoning: str = "", **counts: int) -> Reply:
+def reply(text, finish="unknown", reasoning="", **counts):
     return Reply(text=text, finish=finish, reasoning=reasoning, usage=Usage(**counts))
 
 
-def named(model: str, one: Reply) -> Reply:
+def named(model, one):
     return one.model_copy(update={"provider_model": model})
 
 
@@ -126,7 +124,7 @@ DETAILS = {"prompt_tokens_details": {"cached_tokens": 3, "cache_write_tokens": 1
            "completion_tokens_details": {"reasoning_tokens": 2}}  # fmt: skip
 
 
-def candidate(*parts: object, **fields: object) -> dict[str, object]:
+def candidate(*parts, **fields):
     return {"candidates": [{"content": {"parts": list(parts)}, **fields}]}
 
 
@@ -223,13 +221,13 @@ keys = st.text(min_size=1, max_size=5)
 seeds = st.integers(0, 10**6)
 
 
-def said(name: str, request: Request) -> Reply:
+def said(name, request):
     model = build_model(ModelConfig(name=name), cache=None)
     assert not model.needs_messages
     return asyncio.run(model.ask(request))
 
 
-def steps(name: str, request: Request) -> list[int]:
+def steps(name, request):
     """The steps of a reply whose every line has the benchmark's form."""
     lines = said(name, request).text.splitlines()
     read = [re.fullmatch(r"Step(\d+): Move block with index (\d+)", line) for line in lines]

@@ -18,7 +18,6 @@ from phyblock.errors import (
 )
 from phyblock.models.costs import Budget
 from phyblock.models.model import FAILURES_TO_REST, ChatModel, Limits, RetryPolicy, Server, Servers
-from phyblock.models.request import Model, Request
 from phyblock.records.record import Reply
 from tests.models.factory import ROUTES, ask, make_model, make_request, with_fields
 from tests.models.test_limits import FakeTime
@@ -40,10 +39,10 @@ class Outage:
     failed: int = 0
     answered: int = 0
 
-    def is_away(self) -> bool:
+    def is_away(self):
         return self.begins_s <= self.time.now_s < self.ends_s
 
-    async def complete(self, _: Request) -> Reply:
+    async def complete(self, _):
         was_away = self.is_away()
         if not was_away:
             await self.time.sleep(self.takes_s)
@@ -53,18 +52,16 @@ class Outage:
         self.answered += 1
         return Reply(text="Step1: Move block with index 1")
 
-    async def aclose(self) -> None:
+    async def aclose(self):
         pass
 
 
-def ask_through(
-    client: Outage, time: FakeTime, *, samples: int, width: int, most_failures: int = 20
-) -> tuple[list[Reply | ModelError], list[str]]:
+def ask_through(client, time, *, samples, width, most_failures=20):
     """Ask as a run does, `width` samples at once, a stopped model no more."""
     answers: list[Reply | ModelError] = []
     told: list[str] = []
 
-    async def main() -> None:
+    async def main():
         policy = RetryPolicy(clock=time.clock, max_connection_failures=most_failures)
         servers = Servers([Server("http://gone:1", client)], policy, told.append)
         overall = asyncio.Semaphore(width)
@@ -80,7 +77,7 @@ def ask_through(
         )
         queue = [make_request(f"{n:03}") for n in range(samples)]
 
-        async def work() -> None:
+        async def work():
             while queue:
                 request = queue.pop(0)
                 try:
@@ -136,12 +133,12 @@ def test_a_server_that_has_answered_is_tried_for_as_long_as_the_policy_says(begi
     assert begins_s + 290 <= time.now_s < begins_s + 420
 
 
-def servers_of(count: int, policy: RetryPolicy | None = None) -> Servers:
+def servers_of(count, policy=None):
     made = [Server(f"http://replica:{n}", None) for n in range(count)]
     return Servers(made, policy or RetryPolicy(), lambda _: None)
 
 
-def break_off(servers: Servers, server: Server, error: ModelError = REFUSED) -> None:
+def break_off(servers, server, error=REFUSED):
     for number in range(FAILURES_TO_REST):
         servers.failed(server, error, number, servers._policy.clock.now())
 
@@ -218,18 +215,18 @@ def test_after_a_429_nobody_asks_before_the_server_wants(status, wait_s):
     assert servers.rest_s() == pytest.approx(wait_s)
 
 
-def at(*urls: str, route: str = "direct", **fields: object) -> ModelConfig:
+def at(*urls, route="direct", **fields):
     """The model of a route at all these addresses."""
     config = ROUTES[route].config(urls[0], **fields)
     return with_fields(config, api_base=tuple(url + ROUTES[route].path for url in urls))
 
 
-async def answers_of(model: Model, *names: str) -> list[object]:
+async def answers_of(model, *names):
     asked = (model.ask(make_request(name)) for name in names)
     return list(await asyncio.gather(*asked, return_exceptions=True))
 
 
-def names(count: int) -> list[str]:
+def names(count):
     return [f"{n:03}" for n in range(count)]
 
 
@@ -238,7 +235,7 @@ def test_servers_that_die_in_the_middle_lose_nothing(route):
     servers = [OpenAIChat(Faults(latency_s=0.01), width=1) for _ in range(4)]
     told: list[str] = []
 
-    async def main() -> list[object]:
+    async def main():
         started = [await start(server, 0) for server in servers]
         config = at(*(f"http://127.0.0.1:{port}" for _, port in started), route=route)
         policy = RetryPolicy(base_s=0.01, max_wait_s=0.05)

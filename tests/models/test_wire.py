@@ -6,9 +6,7 @@ import asyncio
 import contextlib
 import json
 import socket
-from collections.abc import Iterator
 from dataclasses import replace
-from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -28,7 +26,7 @@ from phyblock.errors import (
 from phyblock.models import client
 from phyblock.models.client import shown
 from phyblock.models.model import ModelEvent, RetryPolicy
-from phyblock.models.request import Image, Message, Model, Request, json_body, wire_messages
+from phyblock.models.request import Image, Message, json_body, wire_messages
 from phyblock.parsing.answer import choice_form
 from phyblock.parsing.move import move_form
 from phyblock.parsing.plan import plan_form
@@ -45,7 +43,7 @@ from tests.models.factory import (
     make_request,
     picture,
 )
-from tests.servers.chassis import Faults, LocalServer, Running, Seen
+from tests.servers.chassis import Faults, Running
 from tests.servers.faults import WIRE_FAULTS
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import KEY
@@ -57,30 +55,23 @@ ONCE = RetryPolicy(1, 0.0)
 class Wire:
     """One server for each route, which forgets what was before whenever a test asks."""
 
-    def __init__(self, running: dict[str, Running]) -> None:
+    def __init__(self, running):
         self._running = running
 
-    def ask(
-        self,
-        route: str,
-        *requests: Request,
-        faults: Faults | None = None,
-        policy: RetryPolicy = QUICK,
-        **fields: Any,
-    ) -> tuple[list[Any], LocalServer, list[ModelEvent]]:
+    def ask(self, route, *requests, faults=None, policy=QUICK, **fields):
         """Ask a new model one request after another: its answers, the server, the events."""
         server, url = self.at(route, faults)
         events: list[ModelEvent] = []
         config = ROUTES[route].config(url, **{"max_concurrency": 1, **fields})
         return ask(make_model(config, events=events, policy=policy), *requests), server, events
 
-    def arrived(self, route: str, request: Request, **fields: Any) -> Seen:
+    def arrived(self, route, request, **fields):
         """Return a request as it arrived at the server."""
         (answer,), server, _ = self.ask(route, request, **fields)
         assert isinstance(answer, Reply), answer
         return server.seen[0]
 
-    def at(self, route: str, faults: Faults | None = None) -> tuple[LocalServer, str]:
+    def at(self, route, faults=None):
         """Return the server of a route, as new, and its address."""
         running = self._running[route]
         running.server.forget(faults)
@@ -88,13 +79,13 @@ class Wire:
 
 
 @pytest.fixture(scope="module")
-def wire() -> Iterator[Wire]:
+def wire():
     with contextlib.ExitStack() as stack:
         yield Wire({n: stack.enter_context(Running(r.server())) for n, r in ROUTES.items()})
 
 
 @pytest.fixture(autouse=True)
-def _no_proxy(monkeypatch: pytest.MonkeyPatch) -> None:
+def _no_proxy(monkeypatch):
     monkeypatch.setenv("NO_PROXY", "*")
 
 
@@ -140,7 +131,7 @@ def test_both_transports_put_the_same_json_on_the_wire(wire, extra):
 @pytest.mark.parametrize("route", ["direct", "openai"])
 def test_thoughts_left_in_the_text_become_reasoning(route):
     class Thinker(OpenAIChat):
-        def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
+        def reply(self, seen, ending):
             content = "<think>\nred first\n</think>\n\nStep1: Move block with index 3"
             message = {"role": "assistant", "content": content}
             choices = [{"message": message, "finish_reason": "stop"}]
@@ -152,7 +143,7 @@ def test_thoughts_left_in_the_text_become_reasoning(route):
     assert reply.reasoning.strip() == "red first"
 
 
-def looked_at(seen: Seen) -> list[object]:
+def looked_at(seen):
     """Return the detail that a request asks for, picture by picture or as a whole."""
     if "contents" in seen.raw:
         whole = seen.params.get("mediaResolution")
@@ -213,7 +204,7 @@ def test_only_pictures_are_sent_as_pictures():
         wire_messages(request.messages, None)
 
 
-def asking(form: Any) -> Request:
+def asking(form):
     return replace(make_request("017", 42), response_format=form.response_format)
 
 
@@ -227,7 +218,7 @@ def test_the_schema_arrives_as_it_is_declared(wire):
 @pytest.mark.slow
 @pytest.mark.parametrize("form", [plan_form(16), move_form(16), choice_form("abcd", True)])
 def test_litellm_hands_every_schema_on(wire, form):
-    def arrived(route: str) -> Seen:
+    def arrived(route):
         return wire.arrived(route, asking(form), response_format="always")
 
     direct = arrived("direct").raw
@@ -296,7 +287,7 @@ ENDS: dict[str, tuple[type, int, tuple[str, ...]]] = {
 CELLS = [(route, mode) for mode, (_, _, routes) in ENDS.items() for route in routes]
 
 
-def seeded(*seeds: int) -> list[Request]:
+def seeded(*seeds):
     return [make_request("001", seed) for seed in seeds]
 
 
@@ -387,13 +378,13 @@ SERVERS_WORDS = {
 Answers = dict[str, Reply | ModelError]
 
 
-def answers_to(route: Route, server: LocalServer, url: str, faults: list[str]) -> Answers:
+def answers_to(route, server, url, faults):
     """Return what comes of each fault, met one after another; each costs one request.
 
     One model meets them all, as long as it is not stopped: no fault spoils what comes after it.
     """
 
-    async def one(model: Model, mode: str) -> Reply | ModelError:
+    async def one(model, mode):
         server.faults = Faults(mode=mode)
         try:
             reply = await model.ask(make_request())
@@ -401,13 +392,13 @@ def answers_to(route: Route, server: LocalServer, url: str, faults: list[str]) -
             return error
         return reply
 
-    def new(timeout_s: float) -> Model:
+    def new(timeout_s):
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(client, "LARGEST_REPLY_BYTES", 2**20)
             asked = route.config(url, seed="never", timeout_s=timeout_s)
             return make_model(asked, policy=ONCE)
 
-    async def all_of_them() -> Answers:
+    async def all_of_them():
         found: Answers = {}
         model, hasty = new(20.0), new(0.7)
         for mode in faults:
@@ -476,7 +467,7 @@ def test_both_transports_say_the_same_of_what_a_server_said(wire):
     assert told[1:] == [told[0]] * 3
 
 
-def unreachable(name: str, url: str, **fields: Any) -> str:
+def unreachable(name, url, **fields):
     """Return what is said of a server that no connection can be made to."""
     config = ROUTES[name].config(url, seed="never", **fields)
     (answer,) = ask(make_model(config, policy=ONCE), make_request())

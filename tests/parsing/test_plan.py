@@ -19,7 +19,7 @@ COUNTS = Path(__file__).with_name("recordings.csv")
 """Readings of the official recordings, by model."""
 
 
-def asked(*numbers: int) -> str:
+def asked(*numbers):
     """Return a plan in the asked form."""
     return "\n".join(f"Step{i}: Move block with index {n}" for i, n in enumerate(numbers, 1))
 

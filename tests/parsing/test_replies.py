@@ -214,7 +214,7 @@ def test_a_plan_is_read_in_whatever_decoration(text):
     assert [(step.candidate, pytest.approx(step.center_cm)) for step in parsed.steps] == STEPS
 
 
-def one(rest: str) -> str:
+def one(rest):
     return f"Step1: block 3 at {rest}\nStep2: block 5 at (0, -5, 7.5)"
 
 
@@ -288,14 +288,14 @@ MOST_RATIO = 3.0  # 2 is linear, 4 quadratic.
 SMALL_S = 0.05  # Times below this say nothing.
 
 
-def seconds(read: Callable[[str], object], text: str) -> float:
+def seconds(read, text):
     """Return the CPU time of reading a text."""
     start = time.process_time()
     read(text)
     return time.process_time() - start
 
 
-def check(read: Callable[[str], object], piece: str) -> None:
+def check(read, piece):
     """Fail where 100 KB take much more than twice the time of 50 KB, each time."""
     whole = (piece * (SIZE // len(piece) + 1))[:SIZE]
     for _ in range(6):

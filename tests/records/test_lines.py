@@ -38,7 +38,7 @@ SCENES = Path("phyblock-400", "scenes.jsonl")
 QUESTIONS = Path("phyblock-vqa", "questions.jsonl")
 
 
-def lines_of(path: Path) -> list[str]:
+def lines_of(path):
     return (DATA / path).read_text(encoding="utf-8").splitlines()
 
 
@@ -63,7 +63,7 @@ def test_a_line_may_say_its_version_and_none_is_from_the_future(kind, raw):
     assert (problem.field, problem.found, problem.allowed) == ("format", "2", "1")
 
 
-def schema(name: str) -> jsonschema.Draft202012Validator:
+def schema(name):
     text = (ROOT / "benchmarks" / "schemas" / f"{name}.schema.json").read_text(encoding="utf-8")
     jsonschema.Draft202012Validator.check_schema(json.loads(text))
     return jsonschema.Draft202012Validator(json.loads(text))
@@ -112,7 +112,7 @@ numbers = st.none() | st.integers(-(10**40), 10**40)
 amounts = st.none() | st.floats()
 
 
-def folder_with(path: Path, *held: bytes) -> Path:
+def folder_with(path, *held):
     """A run folder with these lines, of a run that they belong to."""
     suite = manifest(models=["random"], seeds=[0])
     (path / "run.yaml").write_text(yaml.safe_dump(suite), encoding="utf-8")
@@ -120,7 +120,7 @@ def folder_with(path: Path, *held: bytes) -> Path:
     return path
 
 
-def whole(line: bytes) -> bytes:
+def whole(line):
     record = known_records().validate_json(line, strict=True)
     return json.dumps(record.fields(), ensure_ascii=False, separators=(",", ":")).encode()
 

@@ -3,7 +3,6 @@
 import shutil
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -12,8 +11,8 @@ from phyblock.records.files import MANIFEST, Manifest, Validation, known_records
 from phyblock.records.record import Call
 from phyblock.results.load import load_run
 from phyblock.run.rescore import rescore
-from tests.data.broken import YAML_TEXTS, Raw, plan_record
-from tests.workspace import Workspace, read_lines, write_lines
+from tests.data.broken import YAML_TEXTS, plan_record
+from tests.workspace import read_lines, write_lines
 
 IDENTITY = "5eed" * 16
 
@@ -26,12 +25,12 @@ def test_what_no_run_writes_is_refused_in_words(tmp_path, name, field):
         read_manifest(tmp_path)
 
 
-def facts() -> Manifest:
+def facts():
     """The manifest of the run that `plan_record` is of."""
     return Manifest.model_validate({"identity": IDENTITY})
 
 
-def differs(validation: Validation, record: Raw) -> str | None:
+def differs(validation, record):
     """The field that shows that a record is of another run."""
     problem = validation.problem("records.jsonl:7", known_records().validate_python(record))
     if problem is None:
@@ -41,7 +40,7 @@ def differs(validation: Validation, record: Raw) -> str | None:
     return problem.field
 
 
-def renamed(**changes: Any) -> Raw:
+def renamed(**changes):
     record = {**plan_record(), **changes}
     parts = (record["track"], record["model"], record["key"], f"s{record['seed']}")
     return {**record, "sample": "/".join(parts)}
@@ -73,7 +72,7 @@ def test_a_call_of_another_run_is_foreign():
 
 
 @pytest.fixture(scope="module")
-def runs(new_workspace: Callable[..., Workspace]) -> Workspace:
+def runs(new_workspace):
     """Two runs that differ in the background of their pictures alone: `out` and `other`."""
     made = new_workspace()
     for name, background in (("other", "white"), ("out", "checkerboard")):

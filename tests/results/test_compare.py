@@ -19,14 +19,13 @@ from phyblock.results.compare import (
     sensitivity_table,
 )
 from phyblock.results.figures import sensitivity
-from phyblock.results.load import Run
 from phyblock.results.text import number
 from tests.web.factory import LEVELS, laws, manifest, record, record_lists, run_of, score
 
 Records = list[dict[str, Any]]
 
 
-def plans(model: str, right: dict[str, int], seeds: tuple[int, ...] = (0,)) -> Records:
+def plans(model, right, seeds=(0,)):
     """Plans of four steps of which `right[scene]` place a block; goals have four blocks."""
     return [
         record(model, scene, seed, [score(tp, 4 - tp, 4 - tp)])
@@ -35,7 +34,7 @@ def plans(model: str, right: dict[str, int], seeds: tuple[int, ...] = (0,)) -> R
     ]
 
 
-def one_seed(*records: dict[str, Any], **facts: Any) -> Run:
+def one_seed(*records, **facts):
     wanted = {"seeds": [0], "settings": ["A"], "matchers": ["optimal"], **facts}
     return run_of(records, manifest(**wanted))
 
@@ -142,7 +141,7 @@ def test_two_runs_are_compared_by_the_models_they_share_or_by_two_named():
         compare_runs(first, second, ["beta", "alpha"])
 
 
-def other_track() -> Run:
+def other_track():
     facts = manifest(seeds=[0])
     facts["suite"]["tracks"] = ["vqa"]
     return run_of([], facts)
@@ -173,7 +172,7 @@ def test_what_a_run_lacks_is_named():
 
 
 def test_the_first_runs_policy_on_missing_replies_holds_for_both():
-    def of(missing: str, failed: str) -> Run:
+    def of(missing, failed):
         lost = record("alpha", failed, outcome="missing", scores=[score(0, 0, 4)])
         right = {scene: 4 for scene in ("000", "001", "002") if scene != failed}
         return one_seed(*plans("alpha", right), lost, models=["alpha"], missing=missing)
@@ -189,7 +188,7 @@ ITEMS = 12
 ASKED = {"alpha": ITEMS, "beta": ITEMS, "gamma": ITEMS}
 
 
-def varied(models: dict[str, int]) -> Run:
+def varied(models):
     """Return a run of the first so many scenes of each model in every way, of others in one way."""
     told = manifest(models=models, seeds=(0, 1), levels=(2,), settings=["A"], matchers=["optimal"])
     told["suite"]["vary"] = VARY

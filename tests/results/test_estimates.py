@@ -3,7 +3,6 @@
 import json
 import math
 from collections import defaultdict
-from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,7 @@ from hypothesis import strategies as st
 from phyblock.data.official import match_published
 from phyblock.domain.question import CATEGORIES, LETTERS, SUBTASKS
 from phyblock.results.estimates import Headline, all_estimates
-from phyblock.results.load import Run, load_run
+from phyblock.results.load import load_run
 from phyblock.results.paper import beside_paper, published_frame
 from phyblock.scoring.plan import Counts
 from tests.web.factory import LEVELS, laws, manifest, record, record_lists, run_of, score, write_run
@@ -55,7 +54,7 @@ def test_a_cut_last_line_is_passed_over_and_counted(tmp_path_factory, data):
 Records = list[dict[str, Any]]
 
 
-def of(run: Run, measure: str, cell: str = "overall", model: str = "alpha", **way: str) -> Any:
+def of(run, measure, cell="overall", model="alpha", **way):
     """Return the one estimate of a measure; in setting A by the optimal matcher."""
     frame = all_estimates(run)
     wanted = {"measure": measure, "cell": cell, "model": model, **way}
@@ -68,7 +67,7 @@ def of(run: Run, measure: str, cell: str = "overall", model: str = "alpha", **wa
     return frame.iloc[0] if len(frame) else None
 
 
-def value(run: Run, *about: str, **way: str) -> float:
+def value(run, *about, **way):
     row = of(run, *about, **way)
     return math.nan if row is None else float(row["value"])
 
@@ -143,17 +142,7 @@ def test_level_1_has_its_own_criterion_and_overall_counts_every_scene_once():
     assert math.isnan(value(run_of([membership], manifest(level1="membership")), "f1", "1"))
 
 
-def answered(
-    subtask: str,
-    number: int,
-    given: str | None,
-    *,
-    model: str = "alpha",
-    seed: int = 0,
-    right: str = "A",
-    rotation: int = 0,
-    outcome: str = "",
-) -> dict[str, Any]:
+def answered(subtask, number, given, *, model="alpha", seed=0, right="A", rotation=0, outcome=""):
     name = f"{subtask.lower()}-{number:03d}"
     kind = outcome or ("ok" if given else "parse_failure")
     made = record(model, "000", seed, (), kind)
@@ -163,16 +152,14 @@ def answered(
     return {**made, "track": "vqa", "sample": sample, "question": about, "answer": told}
 
 
-def questions(
-    records: Records, seeds: Iterable[int] = (0,), missing: str = "count", **shown: Any
-) -> Run:
+def questions(records, seeds=(0,), missing="count", **shown):
     made = manifest(models=["alpha", "beta"], seeds=seeds, missing=missing)
     made["suite"] |= {"tracks": ["vqa"], "vqa": shown}
     made["tracks"] = {"vqa": {"by_subtask": dict.fromkeys(SUBTASKS, 4)}}
     return run_of(records, made)
 
 
-def complete(right: dict[Any, int], **more: Any) -> Records:
+def complete(right, **more):
     """Return four answers of every subtask, so many of them right."""
     return [
         answered(subtask, number, "A" if number < right.get(subtask, 0) else "B", **more)
@@ -212,7 +199,7 @@ def test_missing_answers_count_as_wrong_or_are_left_out(missing, n, wanted):
 
 
 def test_circular_needs_every_rotation_of_a_seed():
-    def rotations(number: int, seed: int, wrong: int | None) -> Records:
+    def rotations(number, seed, wrong):
         return [
             answered("SH", number, "B" if by == wrong else LETTERS[by], right=LETTERS[by],
                      rotation=by, seed=seed)
@@ -231,9 +218,7 @@ def test_circular_needs_every_rotation_of_a_seed():
     assert value(lacking, "accuracy", "SH") == 0.25
 
 
-def episode(
-    model: str, scene: str, outcomes: str, ending: str, *, seed: int = 0, **fields: Any
-) -> dict[str, Any]:
+def episode(model, scene, outcomes, ending, *, seed=0, **fields):
     """Return an episode of a goal of four blocks; p is placed, o overflow, ? unread, d done."""
     names = {"p": "placed", "o": "overflow", "?": "no_move", "d": "done", "i": "invalid"}
     placed = [outcomes[: n + 1].count("p") for n in range(len(outcomes))]
@@ -250,7 +235,7 @@ def episode(
     return {**made, "ending": ending, "outcomes": told, "progress": placed, "max_steps": 8}
 
 
-def episodes(*records: dict[str, Any], missing: str = "skip") -> Run:
+def episodes(*records, missing="skip"):
     facts = manifest(items={"step_planning": 2}, seeds=[0], missing=missing)
     facts["suite"] |= {"tracks": ["step_planning"]}
     return run_of(records, facts)

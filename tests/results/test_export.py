@@ -5,14 +5,12 @@ import base64
 import csv
 import io
 import json
-from pathlib import Path
 from typing import Any
 
 import pandas as pd
 import pytest
 from PIL import Image as PillowImage
 
-from phyblock.data.base import Dataset, QuestionSet
 from phyblock.data.questions import read_questions
 from phyblock.domain.question import LETTERS, is_picture_option
 from phyblock.integrations import huggingface
@@ -25,7 +23,7 @@ from tests.workspace import csv_rows, write_questions
 HF = "the package datasets is not installed"
 
 
-def asked(model: str, seed: int, right: bool, key: str = "sh-1") -> dict[str, Any]:
+def asked(model, seed, right, key="sh-1"):
     question = {"id": "sh-1", "subtask": "SH", "category": "object_property"}
     return record(model, "000", seed) | {
         "sample": f"vqa/{model}/{key}/s{seed}",
@@ -38,7 +36,7 @@ def asked(model: str, seed: int, right: bool, key: str = "sh-1") -> dict[str, An
 
 
 @pytest.fixture
-def folder(tmp_path: Path) -> Path:
+def folder(tmp_path):
     facts = manifest()
     facts["suite"]["tracks"] = ["full_planning", "vqa"]
     records: list[dict[str, Any]] = []
@@ -102,11 +100,11 @@ def test_a_hugging_face_dataset_has_the_right_rows(folder, tmp_path):
 
 
 @pytest.fixture(scope="module")
-def question_set(tmp_path_factory: pytest.TempPathFactory, towers: Dataset) -> QuestionSet:
+def question_set(tmp_path_factory, towers):
     return read_questions(write_questions(tmp_path_factory.mktemp("vqa") / "q"), towers)
 
 
-def rows_of(path: Path) -> list[dict[str, str]]:
+def rows_of(path):
     csv.field_size_limit(10**8)
     return csv_rows(path, delimiter="\t")
 

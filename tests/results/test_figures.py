@@ -13,14 +13,14 @@ from phyblock.results.figures import (
     shares,
     write_paper_figures,
 )
-from phyblock.results.load import Run, load_run, of_models
+from phyblock.results.load import load_run, of_models
 from tests.web.factory import LEVELS, manifest, record, run_of, score, write_run
 
 TRACK = "full_planning"
 MODELS = ("alpha", "beta", "gamma")
 
 
-def records() -> list[dict[str, object]]:
+def records():
     made = []
     for n, model in enumerate(MODELS):
         for place, scene in enumerate(LEVELS):
@@ -31,7 +31,7 @@ def records() -> list[dict[str, object]]:
 
 
 @pytest.fixture
-def run() -> Run:
+def run():
     return run_of(records(), manifest(models=MODELS, seeds=[0]))
 
 

@@ -13,7 +13,7 @@ from phyblock.files import LIST
 from phyblock.results.compare import compare_models, write_comparison
 from phyblock.results.estimates import all_estimates
 from phyblock.results.figures import Look, write_paper_figures
-from phyblock.results.load import Run, load_run, track_measures
+from phyblock.results.load import load_run, track_measures
 from phyblock.results.tables import coverage_frame, make_tables, summary_of, write_tables
 from phyblock.results.text import NO_VALUE, Column, TextTable, number, to_latex, to_markdown
 from phyblock.tracks.base import kind_of
@@ -24,7 +24,7 @@ from tests.web.factory import laws, manifest, record, record_lists, run_of, scor
 Records = list[dict[str, Any]]
 
 
-def shown_numbers(run: Run, track: str) -> int:
+def shown_numbers(run, track):
     """Hold every number of a track's tables against the estimates of its model; return how many."""
     frame = all_estimates(run)
     scales = {measure.name: measure.scale for measure in track_measures(track)}
@@ -127,7 +127,7 @@ def test_an_unknown_cost_is_never_shown_as_zero():
     }
 
 
-def records_of(model: str) -> Records:
+def records_of(model):
     scores = [score(1, 1, 1), score(2, 1, 0, setting="B"), score(3, 0, 1, criterion="selection")]
     return [
         record(model, scene, seed, scores) for scene in ("000", "002", "003") for seed in (0, 1)

@@ -5,24 +5,23 @@ import os
 import re
 import signal
 import threading
-from typing import Any
 
 import pytest
 
-from tests.servers.batches import BatchFaults, BatchServer, OpenAIBatches
+from tests.servers.batches import BatchFaults, OpenAIBatches
 from tests.servers.chassis import Running
-from tests.workspace import Workspace, questions, read_lines, write_questions
+from tests.workspace import questions, read_lines, write_questions
 
 POLLING = {"batch_poll_s": 0.05}
 
 
-def prepare(workspace: Workspace, url: str, **suite: Any) -> None:
+def prepare(workspace, url, **suite):
     entry = {"id": "openai/gpt-4o-2024-08-06", "api_base": f"{url}/v1", "batch": True}
     workspace.write_yaml("models.yaml", {"alpha": entry})
     workspace.write_suite(**{"models": ["alpha"], "limits": POLLING, "seeds": [0, 1], **suite})
 
 
-def counted_once(server: BatchServer, samples: int) -> bool:
+def counted_once(server, samples):
     """Both seeds of an item ask the same where no seeds are sent."""
     return sum(server.asked.values()) == samples and len(set(server.asked.values())) == 1
 
@@ -61,7 +60,7 @@ def test_a_run_that_waits_is_stopped_and_goes_on_by_the_same_command(workspace):
         waits = threading.Event()
         looks = iter(range(10**6))
 
-        def moment(_: int, name: str) -> None:
+        def moment(_, name):
             # What the first look gave was told before the second.
             if name == "look done" and next(looks) == 1:
                 waits.set()
@@ -110,7 +109,7 @@ def test_kills_of_the_process_lose_nothing_and_ask_nothing_twice(workspace):
         finished(workspace, server, 10)
 
 
-def finished(workspace: Workspace, server: BatchServer, samples: int) -> None:
+def finished(workspace, server, samples):
     workspace.completed("--yes")
     records = workspace.records()
     assert len(records) == samples
@@ -120,14 +119,14 @@ def finished(workspace: Workspace, server: BatchServer, samples: int) -> None:
     assert batches >= {made.token for made in server.made if made.token}
 
 
-def killed_at(workspace: Workspace, server: BatchServer, number: int) -> bool:
+def killed_at(workspace, server, number):
     """Kill a run at a moment of its server; True if it was reached."""
     reached = threading.Event()
     first = threading.Event()
     pids: list[int] = []
     count = iter(range(10**6))
 
-    def moment(_: int, __: str) -> None:
+    def moment(_, __):
         if next(count) == number:
             first.wait(30)
             reached.set()

@@ -1,42 +1,39 @@
 """Whole runs that ask in other ways: shuffled, blind, with another goal, and varied."""
 
 import hashlib
-from typing import Any
 
 import yaml
 
 from phyblock.data.scenes import read_builtin
-from phyblock.domain.scene import AssemblyTask
 from phyblock.sim.pictures import PictureStyle, candidates_png, goal_png
 from phyblock.tracks.base import presented, shown_order
-from tests.servers.chassis import Running, Seen
+from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
-from tests.workspace import Raw, Workspace
 
 STYLE = PictureStyle(size_px=128)
 SEEDS = (0, 1)
 APART = {"size_px": 128, "layout": "separate"}
 
 
-def sighted(answers: dict[tuple[str, ...], str]) -> OpenAIChat:
+def sighted(answers):
     """Plans rightly what it is shown: it knows goals and grids by the digests of their pictures."""
     return OpenAIChat(say=lambda seen: answers[seen.pictures])
 
 
-def digest(png: bytes) -> str:
+def digest(png):
     return hashlib.sha256(png).hexdigest()
 
 
-def plan_of(task: AssemblyTask) -> str:
+def plan_of(task):
     numbers = [task.candidates.index_of(block.look) for block in task.scene.blocks]
     return "\n".join(f"Step{i}: Move block with index {n}" for i, n in enumerate(numbers, 1))
 
 
-def tasks_of(workspace: Workspace) -> dict[str, AssemblyTask]:
+def tasks_of(workspace):
     return {task.key: task for task in read_builtin(workspace.root / "data").tasks}
 
 
-def overall_f1(workspace: Workspace) -> dict[str, float]:
+def overall_f1(workspace):
     """By model, under setting A; plans with the matcher of the headline."""
     rows = workspace.rows("estimates")
     wanted = {"measure": "f1", "cell": "overall", "setting": "A"}
@@ -69,7 +66,7 @@ def test_a_model_that_looks_is_right_in_every_order(workspace):
     check_scored_again(workspace)
 
 
-def check_records(records: list[Raw], tasks: dict[str, AssemblyTask]) -> None:
+def check_records(records, tasks):
     """Both numberings are there, and all models were shown the same order."""
     assert len(records) == 20
     for record in records:
@@ -83,7 +80,7 @@ def check_records(records: list[Raw], tasks: dict[str, AssemblyTask]) -> None:
         assert record["prompt"]["images"][1]["label"] == "candidates"
 
 
-def check_scored_again(workspace: Workspace) -> None:
+def check_scored_again(workspace):
     """Stored replies are read as they were asked for: in the numbers that were shown."""
     first, again = (
         [record["scores"] for record in workspace.records(folder)]
@@ -172,20 +169,20 @@ WAYS, SCENES = 16, 3
 BRIEF = "{% block user %}Build it. End with lines: Step1: Move block with index N{% endblock %}"
 
 
-def moody(seen: Seen) -> str:
+def moody(seen):
     """Answer by the seed as well, as a model that draws."""
     draw = hashlib.sha256(seen.sample.encode()).digest()
     steps = enumerate(draw[:3], 1)
     return "\n".join(f"Step{n}: Move block with index {byte % 5 + 1}" for n, byte in steps)
 
 
-def prepare(workspace: Workspace, url: str, **fields: Any) -> None:
+def prepare(workspace, url, **fields):
     (workspace.root / "brief.j2").write_text(BRIEF, encoding="utf-8")
     workspace.write_models(url, "alpha", transport="direct", seed="always")
     workspace.write_suite(models=["alpha", "random"], limit=SCENES, **fields)
 
 
-def asked(server: OpenAIChat) -> list[str]:
+def asked(server):
     return [seen.sample for seen in server.seen]
 
 
@@ -211,7 +208,7 @@ def test_every_way_is_asked_once_and_the_reference_is_what_a_plain_suite_asks(wo
         assert all("variant" not in record for record in workspace.records())
 
 
-def check_repeats(records: list[Raw], server: OpenAIChat) -> None:
+def check_repeats(records, server):
     """Records say in what they differ from the reference; repeats were sent another seed."""
     mine = [record for record in records if record["model"] == "alpha"]
     assert len(mine) == WAYS * SCENES

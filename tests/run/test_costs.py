@@ -16,7 +16,7 @@ from phyblock.config.suite import load_suite
 from phyblock.models.costs import Estimate as CallEstimate
 from phyblock.models.costs import text_tokens
 from phyblock.run.estimate import Estimate, estimate
-from phyblock.run.plan import RunPlan, make_plan
+from phyblock.run.plan import make_plan
 from phyblock.run.runner import Session
 from tests.models.factory import ROUTES
 from tests.servers.billing import (
@@ -29,7 +29,7 @@ from tests.servers.billing import (
 )
 from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat, said
-from tests.workspace import KEY_VARIABLE, Workspace, in_a_loop, questions, write_questions
+from tests.workspace import KEY_VARIABLE, in_a_loop, questions, write_questions
 
 PRICE = {"input": 10.0, "output": 100.0}
 CALL_USD = 1000 * PRICE["input"] / 1e6 + 40 * PRICE["output"] / 1e6
@@ -40,7 +40,7 @@ TWICE = {"max_attempts": 2, "retry_for_s": 0.0}
 """Limits of a run that gives up soon, however little time it took."""
 
 
-def spent(workspace: Workspace) -> float:
+def spent(workspace):
     return sum(record["reply"]["cost_usd"] for record in workspace.records())
 
 
@@ -143,17 +143,17 @@ CALLS = 4
 
 
 @pytest.fixture(autouse=True)
-def _environment(workspace: Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
+def _environment(workspace, monkeypatch):
     """A cache without pictures: what is not drawn yet is counted, too."""
     monkeypatch.setenv("PHYBLOCK_CACHE", str(workspace.root / "nothing"))
 
 
-def planned(workspace: Workspace) -> RunPlan:
+def planned(workspace):
     loaded = load_suite(workspace.root / "suite.yaml")
     return make_plan(loaded, load_models(workspace.root / "models.yaml"))
 
 
-def begin(workspace: Workspace, stack: ExitStack) -> dict[str, Billing]:
+def begin(workspace, stack):
     """Write a suite and its models, each behind a server that bills as its provider does."""
     servers: dict[str, Billing] = {}
     entries = {}
@@ -180,20 +180,20 @@ def begin(workspace: Workspace, stack: ExitStack) -> dict[str, Billing]:
     return servers
 
 
-def printed(plan: RunPlan, rows: list[Estimate]) -> str:
+def printed(plan, rows):
     console = Console(file=io.StringIO(), width=150)
     print_estimate(console, plan, rows)
     return console.file.getvalue()
 
 
 @in_a_loop
-async def asked(workspace: Workspace, plan: RunPlan) -> None:
+async def asked(workspace, plan):
     """Ask everything of a plan; no tables are made."""
     result = await Session(plan, workspace.out, lambda _: None, use_cache=False).run()
     assert (result.left, result.failed) == (0, 0), result
 
 
-def dollars(prompt_tokens: int, replies: int) -> float:
+def dollars(prompt_tokens, replies):
     return (prompt_tokens * TARIFF["input"] + replies * COMPLETION * TARIFF["output"]) / 1e6
 
 

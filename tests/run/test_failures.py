@@ -6,36 +6,32 @@ import signal
 import sqlite3
 import time
 from collections import Counter
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
-from aiohttp import web
 
 from phyblock.models.cache import ReplyCache
 from phyblock.records.files import STOPPED, read_stopped
 from phyblock.results.load import load_run
-from tests.servers.chassis import ISSUE_MIX, Faults, Running, Seen
+from tests.servers.chassis import ISSUE_MIX, Faults, Running
 from tests.servers.openai_chat import OpenAIChat
-from tests.workspace import Raw, Workspace
 
 
 class BySeed(OpenAIChat):
     """Ends each request as its seed says."""
 
-    def __init__(self, endings: dict[int, str]) -> None:
+    def __init__(self, endings):
         super().__init__()
         self._endings = endings
 
-    def read(self, body: dict[str, Any], request: web.Request) -> Seen:
+    def read(self, body, request):
         seen = super().read(body, request)
         self.faults = Faults(mode=self._endings.get(seen.seed or 0, "ok"))
         return seen
 
 
-def is_scored(record: Raw) -> bool:
+def is_scored(record):
     """True if a record has a score of every setting and matcher."""
     found = {(s["setting"], s["matcher"]) for s in record["scores"] if s["criterion"] == "aov"}
     return found == {(setting, matcher) for setting in "AB" for matcher in ("optimal", "paper")}
@@ -45,7 +41,7 @@ TWICE = {"max_attempts": 2, "retry_for_s": 0.0}
 """Limits of a run that gives up soon, however little time it took."""
 
 
-def coverage(workspace: Workspace) -> dict[str, Raw]:
+def coverage(workspace):
     table = load_run(workspace.out).table("coverage").astype(str)
     return {row["model"]: row for row in table.to_dict("records")}
 
@@ -157,12 +153,12 @@ SAMPLES = 20
 AT_ONCE = 4
 
 
-def prepare(workspace: Workspace, server: OpenAIChat, at_once: int = 1) -> Any:
+def prepare(workspace, server, at_once=1):
     return workspace.served(server, seeds=[0, 1, 2, 3], limits={"max_concurrency": at_once})
 
 
 @contextlib.contextmanager
-def locked(workspace: Workspace) -> Iterator[None]:
+def locked(workspace):
     """Hold the reply cache as another process would."""
     path = workspace.cache / "replies.sqlite"
     ReplyCache(path).close()
@@ -233,7 +229,7 @@ def test_a_run_with_a_locked_cache_ends_as_without_one(workspace):
         assert server.requests == SAMPLES
 
 
-def catches(pid: int, number: signal.Signals) -> bool:
+def catches(pid, number):
     """True if a process has its own handler of a signal, as one that asks models has of SIGTERM."""
     status = Path(f"/proc/{pid}/status").read_text(encoding="utf-8")
     (mask,) = re.findall(r"^SigCgt:\s*(\w+)", status, re.MULTILINE)

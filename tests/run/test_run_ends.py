@@ -10,38 +10,34 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterable, Mapping
 from functools import partial
-from typing import Any
 
 import psutil
 import pytest
-from aiohttp import web
 
 from phyblock.api import run_suite
 from phyblock.config.models import load_models
 from phyblock.config.suite import load_suite
 from phyblock.errors import SimulationError
 from phyblock.records.files import STOPPED
-from phyblock.records.record import Line
 from phyblock.run.plan import make_plan
 from phyblock.run.rescore import rescore
-from phyblock.run.runner import RunEvent, SampleDone, Session, Stopping, to_its_end
+from phyblock.run.runner import SampleDone, Session, Stopping, to_its_end
 from phyblock.run.store import AppendFile
 from phyblock.sim import dynamics
 from phyblock.tracks.full_planning import FullPlanning
 from phyblock.tracks.pictures import Workshop
 from phyblock.tracks.pose_planning import PosePlanning
-from tests.fork_server import Forked, killed
+from tests.fork_server import killed
 from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat
-from tests.workspace import SCENES, Workspace, call
+from tests.workspace import SCENES, call
 
 SAMPLES = 20
 AT_ONCE = 4
 
 
-def wait_for(condition: Callable[[], bool]) -> None:
+def wait_for(condition):
     for _ in range(3000):
         if condition():
             return
@@ -49,12 +45,12 @@ def wait_for(condition: Callable[[], bool]) -> None:
     raise AssertionError("this did not come to pass")
 
 
-def ended(process: Forked) -> tuple[int, str, str]:
+def ended(process):
     out, err = process.communicate(timeout=60)
     return process.returncode, out, err
 
 
-def interrupted(process: Forked, server: OpenAIChat, name: signal.Signals) -> tuple[int, str, str]:
+def interrupted(process, server, name):
     """Interrupt a run while its calls are held, and let them be answered once it waits for them."""
     wait_for(lambda: server.at_once == AT_ONCE)
     process.send_signal(name)
@@ -63,7 +59,7 @@ def interrupted(process: Forked, server: OpenAIChat, name: signal.Signals) -> tu
     return ended(process)
 
 
-def prepare(workspace: Workspace, server: OpenAIChat, *names: str) -> Any:
+def prepare(workspace, server, *names):
     limits = {"max_concurrency": AT_ONCE}
     return workspace.served(server, *names, seeds=[0, 1, 2, 3], limits=limits)
 
@@ -169,7 +165,7 @@ AT_ONCE = 4
 class FirstAtOnce(OpenAIChat):
     """Answers the first request when all are there, and the others when that is long done."""
 
-    async def handle(self, request: web.Request) -> web.StreamResponse:
+    async def handle(self, request):
         is_first = self.most_at_once == 0
         self.faults = Faults(latency_s=0.0 if is_first else 1.0)
         if is_first:
@@ -182,14 +178,14 @@ class FirstAtOnce(OpenAIChat):
         return await super().handle(request)
 
 
-def session(workspace: Workspace, watch: Callable[[RunEvent], None], model: str) -> Session:
+def session(workspace, watch, model):
     workspace.write_suite(models=[model], seeds=[0, 1, 2, 3], limits={"max_concurrency": AT_ONCE})
     known = load_models(workspace.root / "models.yaml") if model == "alpha" else {}
     plan = make_plan(load_suite(workspace.root / "suite.yaml"), known)
     return Session(plan, workspace.out, watch, use_cache=False)
 
 
-def nobody(_: RunEvent) -> None:
+def nobody(_):
     return
 
 
@@ -198,7 +194,7 @@ def test_a_mistake_of_ours_loses_no_call_under_way(workspace, monkeypatch, place
     judge = FullPlanning.judge
     judged: list[object] = []
 
-    def judges_badly(self: FullPlanning, item: Any, text: str | None) -> Any:
+    def judges_badly(self, item, text):
         judged.append(item)
         if len(judged) == 1:
             # Why the run stopped cannot be noted then, which hides nothing.
@@ -206,11 +202,11 @@ def test_a_mistake_of_ours_loses_no_call_under_way(workspace, monkeypatch, place
             raise ZeroDivisionError("in judge")
         return judge(self, item, text)
 
-    def watches_badly(event: RunEvent) -> None:
+    def watches_badly(event):
         if isinstance(event, SampleDone | Stopping):
             raise ZeroDivisionError("in watch")
 
-    async def run() -> None:
+    async def run():
         watch = watches_badly if place == "watch" else nobody
         if place == "judge":
             monkeypatch.setattr(FullPlanning, "judge", judges_badly)
@@ -229,18 +225,18 @@ def test_an_impatient_cancellation_keeps_all_that_was_answered(workspace, monkey
     append, put = AppendFile.append, AppendFile.put
     answered: list[str] = []
 
-    async def notes(self: AppendFile, record: Line) -> None:
+    async def notes(self, record):
         answered.append(record.sample)
         await put(self, record)
 
-    def appends_slowly(self: AppendFile, lines: Iterable[Mapping[str, Any]]) -> None:
+    def appends_slowly(self, lines):
         lines = list(lines)
         if "run" in lines[0]:
             begun.set()
             assert may_end.wait(20)
         append(self, lines)
 
-    async def run() -> None:
+    async def run():
         opened = session(workspace, nobody, "random")
         running = asyncio.create_task(opened.run())
         await asyncio.to_thread(begun.wait, 20)
@@ -270,7 +266,7 @@ def test_a_reply_whose_judging_kills_workers_is_recorded_and_scored_later(
     marks.mkdir()
     whole = PosePlanning.judge_apart
 
-    async def fatal(track: PosePlanning, item: Any, text: str | None, earlier: Any) -> Any:
+    async def fatal(track, item, text, earlier):
         if text is not None and item.key == SCENES[0]["id"]:
             await track.work_out(partial(killed, marks, 2))
         return await whole(track, item, text, earlier)
@@ -308,7 +304,7 @@ def test_a_reply_that_is_being_judged_at_a_second_interrupt_is_recorded(
     workspace = inside
     workspace.write_suite(tracks=["pose_planning"], models=["oracle"], pose={"views": ["oblique"]})
 
-    async def slow(track: PosePlanning, item: Any, text: str | None, _: Any) -> Any:
+    async def slow(track, item, text, _):
         for _ in range(2):
             os.kill(os.getpid(), signal.SIGINT)
             await asyncio.sleep(0.1)
@@ -336,7 +332,7 @@ def test_no_process_outlives_a_killed_run(workspace):
     assert not alive
 
 
-def words_of(process: psutil.Process) -> list[str]:
+def words_of(process):
     with contextlib.suppress(psutil.NoSuchProcess):
         return process.cmdline()
     return []
@@ -376,7 +372,7 @@ def test_a_wait_for_a_server_that_cannot_be_reached_is_given_up(workspace):
 
 
 def test_work_of_a_worker_that_was_killed_is_done_again_once(tmp_path):
-    async def work() -> None:
+    async def work():
         assert await shop.work_out(partial(killed, tmp_path, 1)) == "done"
         with pytest.raises(SimulationError, match="killed twice"):
             await shop.work_out(partial(killed, tmp_path, 3))
@@ -391,15 +387,15 @@ def test_work_of_a_worker_that_was_killed_is_done_again_once(tmp_path):
 def test_what_must_be_done_is_done_though_nobody_waits():
     done = []
 
-    async def work() -> str:
+    async def work():
         await asyncio.sleep(0.05)
         done.append("work")
         return "record"
 
-    async def wait() -> tuple[str, bool]:
+    async def wait():
         return await to_its_end(work())
 
-    async def cancelled() -> tuple[str, bool]:
+    async def cancelled():
         waiting = asyncio.create_task(wait())
         for _ in range(3):
             await asyncio.sleep(0.01)

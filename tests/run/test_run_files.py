@@ -76,7 +76,7 @@ def test_a_disk_that_fails_at_any_call_leaves_what_was_written(tmp_path, monkeyp
     file = AppendFile(tmp_path / "lines.jsonl")
     file.append([{"a": 1}])
 
-    def fail(*_: object) -> None:
+    def fail(*_):
         raise OSError(errno.ESTALE, os.strerror(errno.ESTALE))
 
     with monkeypatch.context() as patch:
@@ -96,7 +96,7 @@ def test_a_run_is_on_disk_with_its_name_before_anything_is_asked(workspace, monk
     synced: list[tuple[str, set[str]]] = []
     fsync = os.fsync
 
-    def notes(number: int) -> None:
+    def notes(number):
         names = {path.name for path in workspace.out.iterdir()}
         synced.append((os.readlink(f"/proc/self/fd/{number}"), names))
         fsync(number)
@@ -155,7 +155,7 @@ def test_tables_and_page_are_made_again_where_the_run_or_what_was_made_is_anothe
     workspace.write_suite()
     ends, estimates = set[str](), workspace.out / "tables" / "estimates.csv"
 
-    def is_made(*, page: bool = False) -> bool:
+    def is_made(*, page=False):
         before = estimates.stat().st_mtime_ns if estimates.exists() else 0
         done = workspace.run(page=page)
         assert done.code == 0

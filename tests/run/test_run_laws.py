@@ -7,9 +7,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
 from pathlib import Path
-from types import FrameType
 
 import pytest
 import yaml
@@ -24,13 +22,13 @@ from phyblock.results.load import load_run
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.web.factory import manifest, run_of
-from tests.workspace import Raw, Workspace, call
+from tests.workspace import call
 
 SCORED = ("estimates.csv", "errors.csv", "errors.md", "table1.csv", "table1.md", "table1.tex")
 
 
 @pytest.fixture(scope="module")
-def finished(new_workspace: Callable[..., Workspace]) -> Workspace:
+def finished(new_workspace):
     """A run of a model that answers, one whose every call fails, and two baselines."""
     made = new_workspace()
     made.write_suite(models=["alpha", "random", "oracle"], seeds=[0, 1, 2])
@@ -42,17 +40,17 @@ def finished(new_workspace: Callable[..., Workspace]) -> Workspace:
 
 
 @pytest.fixture
-def copy(finished: Workspace, tmp_path: Path) -> Workspace:
+def copy(finished, tmp_path):
     return finished.copied(tmp_path / "copy")
 
 
-def lasting(files: dict[str, bytes]) -> dict[str, bytes]:
+def lasting(files):
     """Run, records and tables; what is noted of builds may change."""
     parts = ("run.yaml", "records.jsonl", "/tables/")
     return {name: data for name, data in files.items() if any(part in name for part in parts)}
 
 
-def scores(records: list[Raw]) -> dict[str, Raw]:
+def scores(records):
     """Return what was read in each reply and what it is worth, by sample."""
     return {r["sample"]: {k: r[k] for k in ("outcome", "parse", "scores")} for r in records}
 
@@ -291,7 +289,7 @@ def test_one_sample_goes_through_few_modules(inside):
     workspace.write_suite(models=["alpha"], levels=[2, 3], settings=["A"])
     entered: set[str] = set()
 
-    def profile(frame: FrameType, event: str, _: object) -> None:
+    def profile(frame, event, _):
         if event == "call" and len(server.seen) == 2:
             entered.add(frame.f_code.co_filename)
 

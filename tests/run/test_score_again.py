@@ -4,8 +4,6 @@ import re
 import shutil
 import sys
 from collections import Counter
-from collections.abc import Iterator
-from typing import Any
 
 import pytest
 
@@ -16,9 +14,9 @@ from phyblock.records.files import read_manifest
 from phyblock.registry import known_tracks
 from phyblock.run import manifest, rescore, store
 from tests.run.test_track_runs import by_sample
-from tests.servers.chassis import Faults, Running, Seen
+from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import StepAgent
-from tests.workspace import Raw, Workspace, call
+from tests.workspace import call
 
 EARLIER = 5
 
@@ -26,23 +24,23 @@ EARLIER = 5
 class Stopping(StepAgent):
     """Takes no key any more once it has given so many answers; `answered` names their requests."""
 
-    def __init__(self, answers: int) -> None:
+    def __init__(self, answers):
         super().__init__()
         self.answers = answers
         self.answered: list[str] = []
 
-    def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
+    def reply(self, seen, ending):
         self.answered.append(seen.sample)
         if len(self.answered) >= self.answers:
             self.faults = Faults(mode="401")
         return super().reply(seen, ending)
 
 
-def run(out: str, *args: object) -> int:
+def run(out, *args):
     return call("run", "suite.yaml", "--out", out, "--no-report", "--yes", "--no-cache", *args)
 
 
-def read_earlier(monkeypatch: pytest.MonkeyPatch) -> None:
+def read_earlier(monkeypatch):
     """Read as readers of an earlier version, which did not read all numbers."""
     monkeypatch.setattr(manifest, "READER_VERSION", EARLIER)
     plan, move = parse_plan, parse_move
@@ -57,12 +55,12 @@ def read_earlier(monkeypatch: pytest.MonkeyPatch) -> None:
                 monkeypatch.setattr(module, name, read)
 
 
-def unread(text: str) -> str:
+def unread(text):
     return re.sub(r"\(2\)|\(4\)|(?<=index )3", "?", text)
 
 
 @pytest.fixture
-def begun(inside: Workspace, monkeypatch: pytest.MonkeyPatch) -> Iterator[Stopping]:
+def begun(inside, monkeypatch):
     """A run of two tracks that earlier readers began, stopped in the middle of episodes; the
     server, which answers again.
     """
@@ -83,7 +81,7 @@ def begun(inside: Workspace, monkeypatch: pytest.MonkeyPatch) -> Iterator[Stoppi
         yield server
 
 
-def newest(workspace: Workspace, folder: str) -> dict[str, Raw]:
+def newest(workspace, folder):
     """The newest record of every sample, but for what differs between two runs."""
     return by_sample(workspace.records(workspace.root / folder))
 
@@ -124,7 +122,7 @@ def test_it_is_refused_until_it_is_scored_and_then_ends_as_if_today_had_begun_it
 def test_a_kill_before_either_file_is_replaced_processes_and_shards_end_in_the_same_records(
     workspace, monkeypatch
 ):
-    def records(name: str) -> bytes:
+    def records(name):
         return (workspace.root / name / "records.jsonl").read_bytes()
 
     for name in ("whole", "1", "2", "processes", "shards"):
@@ -134,7 +132,7 @@ def test_a_kill_before_either_file_is_replaced_processes_and_shards_end_in_the_s
         folder = workspace.root / str(writes)
         left, write = writes, store.atomic_write
 
-        def dying(*args: Any, **options: Any) -> None:
+        def dying(*args, **options):
             nonlocal left
             left -= 1
             if not left:

@@ -9,10 +9,10 @@ from phyblock.config.suite import Suite
 from phyblock.models.cache import reply_key
 from phyblock.run.plan import to_config
 from tests.models.factory import ask, make_model, make_request
-from tests.servers.chassis import Faults, LocalServer, Running, Seen
+from tests.servers.chassis import Faults, LocalServer, Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.servers.other_protocols import AnthropicMessages, GeminiGenerate
-from tests.workspace import KEY_VARIABLE, Workspace
+from tests.workspace import KEY_VARIABLE
 
 WAYS: list[tuple[str, str, str, type[LocalServer]]] = [
     ("OPENAI_BASE_URL", "openai/m", "/v1", OpenAIChat),
@@ -35,13 +35,13 @@ WAYS: list[tuple[str, str, str, type[LocalServer]]] = [
 ]
 
 
-def config_of(model_id: str, transport: str = "auto") -> ModelConfig:
+def config_of(model_id, transport="auto"):
     spec = ModelConfig(id=model_id, api_key_env=KEY_VARIABLE, transport=transport)
     return to_config("m", spec, Suite(name="s", models=("m",)))
 
 
 @pytest.fixture(autouse=True)
-def _environment(monkeypatch: pytest.MonkeyPatch) -> None:
+def _environment(monkeypatch):
     for variable, *_ in WAYS:
         monkeypatch.delenv(variable, raising=False)
 
@@ -76,7 +76,7 @@ PNG_HEAD = base64.b64encode(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR")[:20]
 class Parrot(OpenAIChat):
     """Says the key in whatever it says."""
 
-    def reply(self, seen: Seen, ending: str) -> dict[str, object]:
+    def reply(self, seen, ending):
         body = super().reply(seen, ending)
         body["model"] = f"a model for {seen.key}"
         for choice in body["choices"]:
@@ -84,11 +84,11 @@ class Parrot(OpenAIChat):
             choice["message"]["reasoning_content"] = f"The key is {seen.key}."
         return body
 
-    def error(self, status: int, ending: str, message: str) -> dict[str, object]:
+    def error(self, status, ending, message):
         return super().error(status, ending, f"{message} {self.seen[-1].key}")
 
 
-def everything(workspace: Workspace) -> dict[str, bytes]:
+def everything(workspace):
     """All bytes below the workspace but the pictures."""
     files = (path for path in workspace.root.rglob("*") if path.is_file())
     return {str(path): path.read_bytes() for path in files if path.suffix != ".png"}

@@ -6,7 +6,6 @@ import re
 import shutil
 from collections import Counter
 from dataclasses import replace
-from typing import Any
 
 import pytest
 import yaml
@@ -14,7 +13,7 @@ from PIL import Image as PillowImage
 
 from phyblock.data.questions import read_questions
 from phyblock.data.scenes import read_builtin
-from phyblock.domain.question import LETTERS, Question
+from phyblock.domain.question import LETTERS
 from phyblock.domain.scene import AssemblyTask, Candidate, CandidateSet, Scene
 from phyblock.errors import InputError, SpecError
 from phyblock.results.compare import compare_runs
@@ -23,24 +22,23 @@ from phyblock.run.rescore import rescore
 from phyblock.sim.engine import ENGINES, described_engine, installed_engines
 from phyblock.sim.pictures import PictureStyle
 from phyblock.sim.question_pictures import question_png
-from tests.fork_server import Done
-from tests.servers.chassis import ISSUE_MIX, Faults, Running, Seen
+from tests.servers.chassis import ISSUE_MIX, Faults, Running
 from tests.servers.openai_chat import OpenAIChat, StepAgent, said, told_history
 from tests.sim.structures import counterweighted_beam
 from tests.tracks.conftest import raw_of
-from tests.workspace import Raw, Workspace, call, questions, vqa_suite, write_questions
+from tests.workspace import call, questions, vqa_suite, write_questions
 
 TRACKS = ["full_planning", "step_planning", "vqa"]
 FORMAT = {"answer_format": "json_schema"}
 RULE = "json"
 
 
-def schema_of(seen: Seen) -> Raw:
+def schema_of(seen):
     """The schema that a prompt ends with."""
     return json.loads(str(seen.parts[-1]).splitlines()[-1])
 
 
-def obedient(seen: Seen) -> str:
+def obedient(seen):
     """Answer in the schema of the prompt: alpha that alone, beta in a sentence."""
     schema = schema_of(seen)
     *_, key = schema["properties"]
@@ -50,7 +48,7 @@ def obedient(seen: Seen) -> str:
     return text if seen.model == "alpha" else f"Here it is: {text}"
 
 
-def rules(record: Raw) -> set[str | None]:
+def rules(record):
     parses = [turn["parse"] for turn in record.get("turns", ())] or [record["parse"]]
     return {parse["rule"] for parse in parses}
 
@@ -118,20 +116,13 @@ def test_all_tracks_ask_and_read_by_the_schema(inside, capsys):
 FEW_QUESTIONS = ["SH", "VP", "OR", "AD"]
 
 
-def a_cube(seen: Seen) -> str:
+def a_cube(seen):
     """The letter of the cube wherever it stands; else A."""
     found = re.search(r"^([A-D])\. cube$", str(seen.parts[-1]), re.MULTILINE)
     return f"It looks like a cube.\n\nAnswer: {found[1] if found else 'A'}"
 
 
-def run_with(
-    workspace: Workspace,
-    server: OpenAIChat,
-    *args: str,
-    models: tuple[str, ...] = ("alpha",),
-    seeds: tuple[int, ...] = (0,),
-    **fields: Any,
-) -> Done:
+def run_with(workspace, server, *args, models=("alpha",), seeds=(0,), **fields):
     write_questions(workspace.root / "questions")
     with Running(server) as running:
         workspace.write_models(running.url, *models, transport="direct")
@@ -141,20 +132,20 @@ def run_with(
         return workspace.run(*args)
 
 
-def pictures_of(workspace: Workspace) -> dict[str, tuple[Question, dict[str, str]]]:
+def pictures_of(workspace):
     """By question, the digest of each of its pictures by label, drawn here."""
     scenes = read_builtin(workspace.root / "data")
     found = read_questions(workspace.root / "questions", scenes)
     style = PictureStyle(size_px=128)
 
-    def digests(question: Question) -> dict[str, str]:
+    def digests(question):
         pngs = {picture.label: question_png(picture, style) for picture in question.pictures}
         return {label: hashlib.sha256(png).hexdigest() for label, png in pngs.items()}
 
     return {task.key: (task.question, digests(task.question)) for task in found.tasks}
 
 
-def shown(seen: Seen) -> list[tuple[str, str]]:
+def shown(seen):
     """Caption and digest of each picture in the order in which they arrived."""
     parts = seen.parts[:-1]
     assert {kind for kind, _ in parts[1::2]} == {"image/png"}
@@ -250,7 +241,7 @@ def test_circular_and_blind_a_question_counts_once_and_only_if_all_rotations_are
     ).replace("}", "")
 
 
-def accuracies(workspace: Workspace, measure: str) -> dict[str, Raw]:
+def accuracies(workspace, measure):
     rows = workspace.rows("estimates")
     return {row["cell"]: row for row in rows if row["measure"] == measure}
 
@@ -260,7 +251,7 @@ FEW = ("--limit", "3")
 VOLATILE = ("time", "latency_s", "attempts", "cached", "run")
 
 
-def prepare(workspace: Workspace, server: StepAgent) -> Any:
+def prepare(workspace, server):
     return workspace.served(
         server,
         tracks=["step_planning"],
@@ -270,14 +261,14 @@ def prepare(workspace: Workspace, server: StepAgent) -> Any:
     )
 
 
-def stable(value: Any) -> Any:
+def stable(value):
     """A record without what differs between two runs of the same replies."""
     if isinstance(value, dict):
         return {k: stable(v) for k, v in value.items() if k not in VOLATILE}
     return [stable(v) for v in value] if isinstance(value, list) else value
 
 
-def by_sample(records: list[dict[str, Any]]) -> dict[str, Any]:
+def by_sample(records):
     return {record["sample"]: stable(record) for record in records}
 
 
@@ -325,7 +316,7 @@ SMALL = ("--set", "images.size_px=128", "--set", "seeds=[0]", "--no-report")
 DATA = ("--set", "dataset.path=./data")
 
 
-def unsteady_scene() -> Raw:
+def unsteady_scene():
     """A plank that tips off its post until the second weight is on."""
     below = (((), 1), ((1,), 2), ((2,), 3), ((2,), 3))
     beam = zip(counterweighted_beam(), below, strict=True)

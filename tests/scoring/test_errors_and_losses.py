@@ -1,7 +1,7 @@
 """Wrong steps and lost goal blocks: one type for each, and the right one."""
 
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import permutations
 
@@ -14,7 +14,6 @@ from phyblock.domain.scene import Block, Candidate, CandidateSet, Plan, Scene
 from phyblock.scoring.plan import (
     BLOCK_OUTCOMES,
     ERROR_TYPES,
-    BlockOutcome,
     ErrorType,
     Goal,
     block_outcomes,
@@ -24,17 +23,17 @@ from phyblock.scoring.plan import (
     step_errors,
     steps_kept,
 )
-from phyblock.types import LEVEL1_CRITERIA, MATCHERS, SETTINGS, Matcher, Setting
+from phyblock.types import LEVEL1_CRITERIA, MATCHERS, SETTINGS
 from tests.scoring.cases import FLAT, TURNED, Case, acyclic, carriers, cases, equal, renumbered
 
 
-def errors_of(case: Case, setting: Setting, matcher: Matcher) -> tuple[ErrorType | None, ...]:
+def errors_of(case, setting, matcher):
     goal = Goal(case.scene, case.candidates, setting)
     match = match_plan(goal, case.plan, matcher)
     return step_errors(goal, case.plan, match)
 
 
-def true_of(case: Case, setting: Setting, index: int, placed: set[int]) -> ErrorType:
+def true_of(case, setting, index, placed):
     """The four definitions, each written out whole, of which exactly one must hold."""
     candidate = case.candidates[index]
     of_kind = [b for b in case.scene.blocks if b.kind == candidate.kind]
@@ -98,17 +97,17 @@ def test_of_choices_alike_the_one_with_the_lightest_types_is_taken(first):
 each_setting = pytest.mark.parametrize("setting", SETTINGS)
 
 
-def outcomes(case: Case, setting: Setting) -> dict[BlockOutcome, int]:
+def outcomes(case, setting):
     goal = Goal(case.scene, case.candidates, setting)
     (counted,) = block_outcomes(goal, case.plan, [match_plan(goal, case.plan, "optimal").counts.tp])
     return counted
 
 
-def kept(case: Case, setting: Setting) -> int:
+def kept(case, setting):
     return steps_kept(Goal(case.scene, case.candidates, setting), case.plan)
 
 
-def closed(case: Case) -> Iterator[frozenset[int]]:
+def closed(case):
     """Every set of orders of blocks that can stand, each on all that it depends on."""
     n = len(case.scene)
     for mask in range(1 << n):
@@ -118,7 +117,7 @@ def closed(case: Case) -> Iterator[frozenset[int]]:
             yield orders
 
 
-def standing(case: Case, setting: Setting, spare: Counter[object]) -> int:
+def standing(case, setting, spare):
     """The most blocks that steps stand for one to one in a set that can stand, in which so many
     more of a kind may be.
     """
@@ -175,7 +174,7 @@ def test_missing_supports_have_the_cause_that_would_mend_them(setting, case):
 
 
 @st.composite
-def distinct_cases(draw: st.DrawFn) -> Case:
+def distinct_cases(draw):
     """Goals of blocks of which no two are of a kind; each can be named as it is, or turned."""
     edges = draw(acyclic(5).filter(bool))
     kinds = [(shape, color) for shape in ("arch", "cuboid3") for color in ("red", "blue", "green")]
@@ -194,7 +193,7 @@ def test_where_no_two_blocks_are_of_a_kind_each_has_the_outcome_that_its_own_sto
     kinds = {look[:2] for look in named}
     blocks = {block.order: block for block in case.scene.blocks}
 
-    def below(order: int) -> set[int]:
+    def below(order):
         return {order}.union(*(below(other) for other in blocks[order].depend))
 
     goal = Goal(case.scene, case.candidates, "A")
@@ -246,7 +245,7 @@ def test_file_order_and_numbering_change_neither(setting, case, data):
     assert kept(shuffled, setting) == kept(case, setting)
 
 
-def common(plan: tuple[int, ...], case: Case, order: tuple[int, ...], setting: Setting) -> int:
+def common(plan, case, order, setting):
     """Length of the longest common subsequence of a plan and an order of blocks."""
     row = [0] * (len(order) + 1)
     for step in plan:

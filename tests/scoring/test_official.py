@@ -2,8 +2,6 @@
 
 import math
 import random
-from collections.abc import Iterator
-from pathlib import Path
 from typing import get_args
 
 import numpy as np
@@ -11,7 +9,7 @@ import pytest
 
 from phyblock.data.scenes import read_builtin
 from phyblock.domain.question import CATEGORIES
-from phyblock.domain.scene import AssemblyTask, Plan
+from phyblock.domain.scene import Plan
 from phyblock.parsing.plan import parse_plan
 from phyblock.results.paper import published_table
 from phyblock.scoring.plan import AssemblyScorer, Counts, Goal, chance, match_plan
@@ -23,13 +21,11 @@ Row = tuple[str, str, str, str]
 
 
 @pytest.fixture(scope="module")
-def tasks(official_checkout: Path) -> dict[str, AssemblyTask]:
+def tasks(official_checkout):
     return {task.scene.id: task for task in official_tasks(official_checkout)}
 
 
-def scored(
-    checkout: Path, tasks: dict[str, AssemblyTask]
-) -> Iterator[tuple[Row, tuple[int, int, int, int]]]:
+def scored(checkout, tasks):
     scorers = {
         name: AssemblyScorer(task.scene, task.candidates, SETTINGS) for name, task in tasks.items()
     }
@@ -62,7 +58,7 @@ EVERY = pytest.mark.parametrize("every", [5, pytest.param(1, marks=pytest.mark.s
 """Each fifth scene, of all levels; all scenes when there is time."""
 
 
-def assert_every_order_scores_1(task: AssemblyTask, rng: np.random.Generator) -> None:
+def assert_every_order_scores_1(task, rng):
     number = [task.candidates.index_of(block.look) for block in task.scene.blocks]
     steps = [index for index in number if index is not None]
     assert len(steps) == len(number), task.scene.id
@@ -100,7 +96,7 @@ OTHERWISE_AVERAGED = {
 """Rows whose printed overall number is not the mean of the printed categories, and that mean."""
 
 
-def published() -> dict[str, dict[tuple[str, str], float]]:
+def published():
     table = published_table(2)
     return {
         str(model): {(row.category, row.subtask): row.value for row in rows.itertuples()}

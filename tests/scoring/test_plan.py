@@ -12,23 +12,22 @@ from phyblock.scoring.plan import (
     AssemblyScorer,
     Counts,
     Goal,
-    Match,
     level1_counts,
     match_plan,
     most_placed,
 )
-from phyblock.types import LEVEL1_CRITERIA, MATCHERS, SETTINGS, Level1Criterion, Matcher, Setting
-from tests.scoring.cases import Case, carriers, cases, choices, equal, greatest_tp, greedy_tp
+from phyblock.types import LEVEL1_CRITERIA, MATCHERS, SETTINGS
+from tests.scoring.cases import carriers, cases, choices, equal, greatest_tp, greedy_tp
 
 each_setting = pytest.mark.parametrize("setting", SETTINGS)
 each_matcher = pytest.mark.parametrize("matcher", MATCHERS)
 
 
-def matched(case: Case, setting: Setting, matcher: Matcher) -> Match:
+def matched(case, setting, matcher):
     return match_plan(Goal(case.scene, case.candidates, setting), case.plan, matcher)
 
 
-def counted(case: Case, setting: Setting, matcher: Matcher = "optimal") -> Counts:
+def counted(case, setting, matcher="optimal"):
     return matched(case, setting, matcher).counts
 
 
@@ -78,7 +77,7 @@ def test_every_valid_order_scores_1(setting, case, seed):
 COUNTS = st.builds(Counts, *[st.integers(0, 1000)] * 3)
 
 
-def level1(case: Case, setting: Setting, criterion: Level1Criterion) -> Counts:
+def level1(case, setting, criterion):
     return level1_counts(Goal(case.scene, case.candidates, setting), case.plan, criterion)
 
 

@@ -18,9 +18,9 @@ from phyblock.domain.blocks import (
     symmetries,
     turn_deg,
 )
-from phyblock.domain.scene import AOVGraph, Block, Candidate, CandidateSet, Plan, Scene
+from phyblock.domain.scene import Block, Candidate, CandidateSet, Plan, Scene
 from phyblock.scoring.plan import Goal, most_placed
-from phyblock.scoring.pose import Laid, Piece, PoseScore, PoseScorer, overlap_volume, placed
+from phyblock.scoring.pose import Laid, Piece, PoseScorer, overlap_volume, placed
 from phyblock.scoring.pose_matching import Motion, Nearness, cheapest, matched
 from phyblock.sim.engine import quat_xyzw_to_euler_deg
 from phyblock.sim.geometry import collision_pieces
@@ -28,12 +28,12 @@ from phyblock.sim.geometry import collision_pieces
 KINDS: tuple[BlockType, ...] = ("cube", "cuboid2", "triangle", "arch")
 
 
-def pieces(block_type: BlockType) -> tuple[Piece, ...]:
+def pieces(block_type):
     return tuple(Piece(p.vertices_m, p.face_normals) for p in collision_pieces(block_type))
 
 
 @st.composite
-def scenes(draw: st.DrawFn) -> tuple[Scene, CandidateSet]:
+def scenes(draw):
     """Blocks anywhere, in any valid order: geometry does not ask whether they would stand."""
     n = draw(st.integers(2, 6))
     grid = st.integers(-6, 6).map(lambda k: k * 0.025)
@@ -53,7 +53,7 @@ def scenes(draw: st.DrawFn) -> tuple[Scene, CandidateSet]:
     return Scene("s", (2,), tuple(blocks), ("s",)), CandidateSet(tuple(candidates))
 
 
-def laid(scene: Scene, candidates: CandidateSet, order: list[int]) -> list[Laid]:
+def laid(scene, candidates, order):
     found = []
     for vertex in order:
         block = scene.blocks[vertex]
@@ -62,22 +62,22 @@ def laid(scene: Scene, candidates: CandidateSet, order: list[int]) -> list[Laid]
     return found
 
 
-def noisy(steps: list[Laid], rng: np.random.Generator, sigma_m: float) -> list[Laid]:
-    def off(step: Laid) -> tuple[float, float, float]:
+def noisy(steps, rng, sigma_m):
+    def off(step):
         x, y, z = np.array(step.position_m) + rng.normal(0, sigma_m, 3)
         return (float(x), float(y), float(z))
 
     return [replace(step, position_m=off(step)) for step in steps]
 
 
-def turned(step: Laid, angle_deg: float, shift_m: tuple[float, float]) -> Laid:
+def turned(step, angle_deg, shift_m):
     """Only the place is turned: candidates keep how they were shown."""
     matrix = euler_deg_to_matrix((0.0, 0.0, angle_deg))
     x, y, z = matrix @ np.array(step.position_m)
     return replace(step, position_m=(x + shift_m[0], y + shift_m[1], z))
 
 
-def summary(score: PoseScore) -> tuple[object, ...]:
+def summary(score):
     fits = [fit for fit in score.fits if fit is not None]
     far = sorted(round(fit.position_cm, 2) for fit in fits)
     shared = sorted(round(fit.iou, 2) for fit in fits if fit.iou is not None)
@@ -217,7 +217,7 @@ def test_steps_are_matched_at_the_least_cost_of_all_valid_ways(n_blocks, n_steps
     near = Nearness(distance, np.zeros(equal.shape), equal)
     found = matched(goal, numbers, near)
 
-    def cost(way: tuple[int | None, ...]) -> tuple[int, float]:
+    def cost(way):
         pairs = [(s, v) for s, v in enumerate(way) if v is not None]
         return -len(pairs), round(sum(float(near.cost[pair]) for pair in pairs), 9)
 
@@ -226,7 +226,7 @@ def test_steps_are_matched_at_the_least_cost_of_all_valid_ways(n_blocks, n_steps
     assert valid(scene.graph, found)
 
 
-def valid(graph: AOVGraph, way: tuple[int | None, ...]) -> bool:
+def valid(graph, way):
     done: set[int] = set()
     for vertex in way:
         if vertex is not None:
@@ -261,7 +261,7 @@ def test_shared_volumes_agree_with_points_drawn_at_random(one, other, seed):
     assert found == pytest.approx(overlap_volume(second, first), abs=1e-12)
 
 
-def _inside(points: np.ndarray, solid: tuple[Piece, ...]) -> np.ndarray:
+def _inside(points, solid):
     found = np.zeros(len(points), dtype=bool)
     for piece in solid:
         heights, spans = points @ piece.normals.T, piece.corners @ piece.normals.T

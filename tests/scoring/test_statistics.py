@@ -1,7 +1,6 @@
 """Uncertainty: intervals, tests, ranks and variance components, and how often they are right."""
 
 from collections import defaultdict
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,7 +14,6 @@ from phyblock.scoring.plan import Floats, f1_of, ratio_of
 from phyblock.scoring.statistics import (
     POWER,
     Clusters,
-    Component,
     detectable,
     holm,
     in_range,
@@ -35,19 +33,19 @@ MEMBERS = st.lists(NAMES, min_size=2, max_size=12)
 P_VALUES = hnp.arrays(float, st.integers(1, 8), elements=st.floats(0, 1))
 
 
-def rng(seed: int = 0) -> np.random.Generator:
+def rng(seed=0):
     return np.random.default_rng(seed)
 
 
-def alone(n: int) -> Clusters:
+def alone(n):
     return Clusters.of([[str(i)] for i in range(n)])
 
 
-def mean_of(sums: Floats) -> Floats:
+def mean_of(sums):
     return np.asarray(sums[..., 0] / sums[..., 1])
 
 
-def difference_of(sums: Floats) -> Floats:
+def difference_of(sums):
     return np.asarray(f1_of(sums)[..., 0] - f1_of(sums)[..., 1])
 
 
@@ -223,19 +221,19 @@ def test_holm_only_raises_and_keeps_the_order_and_the_least_is_bonferronis(p):
     assert corrected.min() == pytest.approx(min(1, len(p) * p.min()))
 
 
-def influence(counts: Floats) -> Floats:
+def influence(counts):
     """Return the influence of each scene on F1, by the derivative of the ratio."""
     weights = np.stack([2 * counts[:, 0], counts @ [2, 1, 1]])
     part, whole = weights.sum(axis=1)
     return np.asarray((weights[0] - part / whole * weights[1]) / whole)
 
 
-def dyadic_se(moves: Floats, clusters: Clusters) -> float:
+def dyadic_se(moves, clusters):
     """The dyadic standard error (Aronow, Samii and Assenova 2015), written out."""
     return float(np.sqrt(moves @ in_common(clusters) @ moves))
 
 
-def in_common(clusters: Clusters) -> np.ndarray:
+def in_common(clusters):
     """Return the pairs of units that have a base scene in common."""
     members = np.zeros((len(clusters.members), clusters.size + 1))
     np.put_along_axis(members, clusters.members, 1.0, axis=1)
@@ -243,7 +241,7 @@ def in_common(clusters: Clusters) -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def official(official_dir: Path) -> tuple[dict[str, Floats], Clusters, Clusters]:
+def official(official_dir):
     """Counts of setting A by model, clusters by base scene, and every scene a cluster."""
     scenes = [task.scene for task in official_tasks(official_dir / "PhyBlock")]
     place = {scene.id: n for n, scene in enumerate(scenes)}
@@ -307,11 +305,11 @@ TRUTH = {"shift": 0.04, "interaction": 0.08, "within": 0.1, "spread": 0.3}
 RUNS = 150
 
 
-def drawn(seed: int, items: int = 12) -> np.ndarray:
+def drawn(seed, items=12):
     return np.random.default_rng(seed).normal(size=(items, 3, 4))
 
 
-def close(one: Component, other: Component, scale: float = 1.0) -> bool:
+def close(one, other, scale=1.0):
     a, b = ([part.sd, part.lo, part.hi] for part in (one, other))
     return np.allclose(np.array(a) * scale, b, rtol=1e-6, atol=1e-7)
 

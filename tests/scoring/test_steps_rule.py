@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.domain.scene import AssemblyTask, Block, Candidate, CandidateSet, Plan, Scene
+from phyblock.domain.scene import Block, Candidate, CandidateSet, Plan, Scene
 from phyblock.scoring.plan import ERROR_TYPES, Goal, match_plan
 from phyblock.scoring.steps import MOVE_OUTCOMES, Assembly, attempted_counts, gated, placed_counts
-from phyblock.types import GATINGS, SETTINGS, Gating, Setting
-from tests.scoring.cases import Case, cases
+from phyblock.types import GATINGS, SETTINGS
+from tests.scoring.cases import cases
 from tests.shipped import TASKS, official_tasks
 
 ORDERS = 20
@@ -20,15 +20,13 @@ any_setting = st.sampled_from(SETTINGS)
 any_gating = st.sampled_from(GATINGS)
 
 
-def solved_number(task_scene: Scene, candidates: CandidateSet) -> list[int]:
+def solved_number(task_scene, candidates):
     numbers = [candidates.index_of(block.look) for block in task_scene.blocks]
     assert None not in numbers
     return [number for number in numbers if number is not None]
 
 
-def assert_no_valid_order_fails(
-    task: AssemblyTask, orders: int, rng: np.random.Generator, setting: Setting, gating: Gating
-) -> None:
+def assert_no_valid_order_fails(task, orders, rng, setting, gating):
     numbers = solved_number(task.scene, task.candidates)
     graph = gated(task.scene, gating).graph
     for _ in range(orders):
@@ -60,7 +58,7 @@ def test_no_valid_order_fails(source, setting, gating, orders, request):
         assert_no_valid_order_fails(task, orders, rng, setting, gating)
 
 
-def right(case: Case, setting: Setting) -> list[int]:
+def right(case, setting):
     """For each block of the scene, candidates that stand for it; none is 0."""
     attribute = attrgetter("look" if setting == "A" else "kind")
     offered = [None, *map(attribute, case.candidates.candidates)]
@@ -137,12 +135,12 @@ def test_a_number_that_no_candidate_has_is_invalid(case, index):
     assert outcome in MOVE_OUTCOMES
 
 
-def cube(order: int, color: str, depend: tuple[int, ...] = (), turn: float = 0.0) -> Block:
+def cube(order, color, depend=(), turn=0.0):
     layer = 1 + bool(depend)
     return Block(order, "arch", color, (0, 0, 0), (0, 0, turn), depend, layer)
 
 
-def two_pillars() -> tuple[Scene, CandidateSet]:
+def two_pillars():
     """Two equal red blocks; a blue one stands on the first, a green one on the second."""
     blocks = (cube(1, "red"), cube(2, "red"), cube(3, "blue", (1,)), cube(4, "green", (2,)))
     colors = ("red", "blue", "green", "yellow")

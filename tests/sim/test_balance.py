@@ -3,25 +3,20 @@
 import ast
 import math
 import sys
-from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from phyblock.domain.blocks import SHAPES
-from phyblock.domain.scene import Block
 from phyblock.sim import balance, certificate
 from phyblock.sim.balance import (
     FRICTIONS,
     MARGIN_M,
-    Floats,
     is_balanced,
     prove,
     surely_falls,
@@ -69,7 +64,7 @@ def test_a_solver_that_says_too_little_is_left_over_bears_nothing(plank, plank_m
 
 
 @st.composite
-def loaded_planks(draw: st.DrawFn) -> list[Block]:
+def loaded_planks(draw):
     """A plank across a cube, on the grid that scenes are built on, with up to two weights."""
     places = st.integers(-5, 5).map(lambda steps: 0.0125 * steps)
     plank = draw(st.sampled_from(["cuboid3", "cuboid2"]))
@@ -84,10 +79,10 @@ def loaded_planks(draw: st.DrawFn) -> list[Block]:
 @settings(max_examples=40)
 @given(loaded_planks())
 def test_least_squares_and_linear_programming_agree(blocks):
-    def verdicts() -> tuple[bool, bool]:
+    def verdicts():
         return is_balanced(blocks), surely_stands(blocks)
 
-    def finds_none(forces: Floats, weights: Floats) -> tuple[Floats, NDArray[np.bool_]]:
+    def finds_none(forces, weights):
         return np.zeros((forces.shape[1], weights.shape[1])), np.zeros(weights.shape[1], dtype=bool)
 
     with pytest.MonkeyPatch.context() as patched:
@@ -130,7 +125,7 @@ def test_a_plank_surely_stands_on_posts_that_it_covers_by_the_margin(over_m, ang
 
 
 @st.composite
-def disturbed(draw: st.DrawFn) -> list[Block]:
+def disturbed(draw):
     """A small scene of the data set, a support taken away, a block put elsewhere or turned."""
     blocks = list(draw(st.sampled_from(SMALL)))
     if draw(st.booleans()):
@@ -148,7 +143,7 @@ def disturbed(draw: st.DrawFn) -> list[Block]:
     return blocks
 
 
-def stands_in(engine: str, blocks: Sequence[Block]) -> bool:
+def stands_in(engine, blocks):
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("PHYBLOCK_PHYSICS", engine)
         return stands(blocks, ONE_SETTING)
@@ -185,7 +180,7 @@ STANDING = prove([*tower(1), block(2, "cuboid3", (0, 0, 0.0625), (0, 0, 90))])
 FALLING = prove([*tower(1), block(2, "cuboid2", (0.06, 0, 0.0625))])
 
 
-def put(value: Any, path: tuple[int, ...], change: Callable[[int], int]) -> Any:
+def put(value, path, change):
     """Nested tuples with the number at a path changed."""
     if not path:
         return change(value)
@@ -195,7 +190,7 @@ def put(value: Any, path: tuple[int, ...], change: Callable[[int], int]) -> Any:
     return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)
 
 
-def numbers(value: Any, path: tuple[int, ...] = ()) -> Iterator[tuple[int, ...]]:
+def numbers(value, path=()):
     """The path of each number in nested tuples."""
     if not isinstance(value, tuple):
         yield path
@@ -223,7 +218,7 @@ def test_a_proof_with_any_force_changed_or_left_out_is_refused():
         assert not proves(Stands(fewer), STANDING.structure)
 
 
-def other_than(n: int) -> int:
+def other_than(n):
     """Change an index, a flag or a length to what it is not."""
     return (not n) if isinstance(n, bool) else n + (1 if abs(n) < 9 and n else ONE // 20)
 

@@ -3,7 +3,6 @@
 import os
 import subprocess
 import sys
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,15 +15,7 @@ from phyblock.domain.scene import Block
 from phyblock.making.scenes.sketch import POSES
 from phyblock.sim import dynamics
 from phyblock.sim.contact import drop_height_m
-from phyblock.sim.dynamics import (
-    DEFAULT_TRIAL,
-    ONE_SETTING,
-    Settled,
-    Trial,
-    check,
-    check_steps,
-    settle,
-)
+from phyblock.sim.dynamics import DEFAULT_TRIAL, ONE_SETTING, Trial, check, check_steps, settle
 from phyblock.sim.engine import ENGINES, Physics, Pose, World
 from phyblock.sim.outcomes import after_removal, holds
 from tests.shipped import TASKS, official_tasks
@@ -41,7 +32,7 @@ SEESAW = (
 """A bar whose middle is far from the cube it lies on: it tips until a second cube is there."""
 
 
-def poses_as_hex(blocks: Sequence[Block], duration_s: float) -> str:
+def poses_as_hex(blocks, duration_s):
     with World() as world:
         world.place(*blocks)
         world.step(duration_s)
@@ -99,7 +90,7 @@ print(execute([
 def test_execution_depends_on_no_processor():
     """OpenBLAS adds up in another order, and without fused operations, for an old processor."""
 
-    def printed(**more: str) -> str:
+    def printed(**more):
         command, env = [sys.executable, "-c", SHAKEN], {**os.environ, **more}
         root = Path(__file__).parents[2]
         return subprocess.run(
@@ -153,7 +144,7 @@ def test_no_verdict_depends_on_a_place(x_m, y_m):
 
 @pytest.mark.parametrize("trial", [ONE_SETTING, DEFAULT_TRIAL], ids=["one", "default"])
 def test_the_same_falls_whatever_was_tried_before(trial):
-    def settled(blocks: Sequence[Block], *, in_new_worlds: bool) -> Settled:
+    def settled(blocks, *, in_new_worlds):
         forgotten = (dynamics._settled, dynamics._stays)
         for cached in (*forgotten, dynamics._open_world) if in_new_worlds else forgotten:
             cached.cache_clear()

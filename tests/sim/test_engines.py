@@ -1,6 +1,5 @@
 """Laws of every physics engine that is installed, and of plans executed in it."""
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -19,9 +18,7 @@ from phyblock.sim.engine import (
     ENGINES,
     GRAVITY_M_S2,
     Physics,
-    PhysicsEngine,
     Pose,
-    Simulation,
     installed_engines,
     physics_engine,
 )
@@ -32,30 +29,30 @@ PHYSICS = Physics()
 heights = st.floats(0.5, 2.0)
 
 
-def chosen(word: str) -> PhysicsEngine:
+def chosen(word):
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("PHYBLOCK_PHYSICS", word)
         return physics_engine()
 
 
 @pytest.fixture(params=installed_engines(), scope="module")
-def engine(request: pytest.FixtureRequest) -> PhysicsEngine:
+def engine(request):
     """Any engine."""
     return chosen(request.param)
 
 
 @pytest.fixture
-def simulation(engine: PhysicsEngine) -> Iterator[Simulation]:
+def simulation(engine):
     with engine.open(PHYSICS) as opened:
         yield opened
 
 
-def add_all(simulation: Simulation, blocks: list[Block]) -> None:
+def add_all(simulation, blocks):
     for one in blocks:
         simulation.add(one.order, one.type, Pose.goal(one))
 
 
-def bits(simulation: Simulation, blocks: list[Block]) -> str:
+def bits(simulation, blocks):
     """Return places and motions of blocks, to the last bit."""
     rows = []
     for one in blocks:
@@ -64,7 +61,7 @@ def bits(simulation: Simulation, blocks: list[Block]) -> str:
     return np.concatenate(rows).tobytes().hex()
 
 
-def fall(engine: PhysicsEngine, blocks: list[Block], steps: int) -> str:
+def fall(engine, blocks, steps):
     with engine.open(PHYSICS) as opened:
         add_all(opened, blocks)
         opened.step(steps)
@@ -142,11 +139,11 @@ def test_an_engine_that_is_unknown_or_not_installed_is_refused(name, monkeypatch
     assert installed_engines() == ()
 
 
-def at(one: Block, x_m: float, y_m: float, z_m: float) -> Block:
+def at(one, x_m, y_m, z_m):
     return replace(one, position_m=(x_m, y_m, z_m))
 
 
-def ends(blocks: list[Block | None], engine: PhysicsEngine, **limits: float) -> list[str]:
+def ends(blocks, engine, **limits):
     return [step.end for step in execute(blocks, ExecutionLimits(**limits), engine).steps]
 
 

@@ -17,7 +17,6 @@ from phyblock.domain.blocks import (
     euler_deg_to_quat_xyzw,
     quat_xyzw_to_matrix,
 )
-from phyblock.domain.scene import Block
 from phyblock.sim.contact import (
     GROUND,
     drop_m,
@@ -27,14 +26,14 @@ from phyblock.sim.contact import (
     separating_axes,
     support_graph,
 )
-from phyblock.sim.geometry import ConvexPiece, Mesh, collision_pieces, drawn_mesh, solid_mesh
+from phyblock.sim.geometry import collision_pieces, drawn_mesh, solid_mesh
 from tests.shipped import official_tasks
 from tests.sim.structures import angles_deg, block, block_types, eulers, tower, turned
 
 every_type = pytest.mark.parametrize("block_type", BLOCK_TYPES)
 
 
-def is_closed(mesh: Mesh) -> bool:
+def is_closed(mesh):
     """True if every edge is used exactly once in each direction."""
     edges = np.concatenate([mesh.triangles[:, [i, (i + 1) % 3]] for i in range(3)])
     forward = {(int(a), int(b)) for a, b in edges}
@@ -118,12 +117,12 @@ ANNOTATION_ERROR_M = 0.002
 shifts_m = st.floats(-0.12, 0.12)
 
 
-def placed(one: Block) -> list[ConvexPiece]:
+def placed(one):
     rotation = quat_xyzw_to_matrix(euler_deg_to_quat_xyzw(one.euler_deg))
     return [moved(p, rotation, np.array(one.position_m)) for p in collision_pieces(one.type)]
 
 
-def share_a_point(first: ConvexPiece, second: ConvexPiece) -> bool:
+def share_a_point(first, second):
     """True if two convex hulls meet, asked of a linear program."""
     n, m = len(first.vertices_m), len(second.vertices_m)
     equal = np.zeros((5, n + m))

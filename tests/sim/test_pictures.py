@@ -4,7 +4,6 @@ import hashlib
 import io
 import itertools
 import pickle
-from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from multiprocessing import get_context
@@ -19,13 +18,13 @@ from PIL import Image, ImageSequence
 
 from phyblock.domain.blocks import BLOCK_TYPES, KIT_PALETTE
 from phyblock.domain.question import Mark, QuestionPicture
-from phyblock.domain.scene import Block, Candidate, CandidateSet, Scene
+from phyblock.domain.scene import Candidate, CandidateSet, Scene
 from phyblock.errors import DataError
 from phyblock.making.scenes.candidates import make_candidates
 from phyblock.making.scenes.sketch import POSES
 from phyblock.sim import ruled
 from phyblock.sim.backgrounds import GROUNDS
-from phyblock.sim.camera import VIEWS, Camera, Window, frame, view_axes
+from phyblock.sim.camera import VIEWS, Window, frame, view_axes
 from phyblock.sim.engine import Pose, quat_xyzw_to_euler_deg
 from phyblock.sim.film import FilmStep, assembly_gif, episode_gif, episode_images
 from phyblock.sim.pictures import (
@@ -85,7 +84,7 @@ slowly = [
 ]
 
 
-def pixels(png: bytes) -> NDArray[np.int64]:
+def pixels(png):
     with Image.open(io.BytesIO(png)) as image:
         return np.asarray(image.convert("RGB")).astype(np.int64)
 
@@ -133,7 +132,7 @@ def test_the_renderer_draws_where_the_camera_says(view):
     assert_allclose(found, [*places.min(axis=0), *places.max(axis=0)], atol=3.0)
 
 
-def lies_between_planes(blocks: Sequence[Block], camera: Camera) -> bool:
+def lies_between_planes(blocks, camera):
     points = np.vstack([drawn_m(one) for one in blocks])
     depths = (points - camera.eye_m) @ camera.axes[2]
     return bool(0 < camera.near_m < depths.min() and depths.max() < camera.far_m)
@@ -186,7 +185,7 @@ def test_every_look_has_a_picture_of_its_own_that_fills_its_cell_above_the_numbe
         assert (np.abs(one_look - other).max(axis=-1) > 45).mean() > 0.01
 
 
-def luminance(rgb: NDArray[np.float64]) -> NDArray[np.float64]:
+def luminance(rgb):
     """Relative luminance of colors (..., 3), 0..255, as WCAG 2.2 defines it."""
     share = rgb / 255
     linear = np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 import phyblock.sim
 from phyblock.domain.blocks import BLOCK_TYPES, quat_xyzw_to_matrix
@@ -18,7 +17,7 @@ from phyblock.sim.camera import Camera, Window, frame, view_axes
 from phyblock.sim.engine import Pose
 from phyblock.sim.geometry import drawn_mesh
 from phyblock.sim.pictures import COLOR_RGB, light_direction
-from phyblock.sim.raster import Light, Prop, Raster, draw
+from phyblock.sim.raster import Light, Prop, draw
 from tests.sim.structures import block, block_types, clouds, eulers
 
 SIZE_PX = 160
@@ -31,7 +30,7 @@ views = st.tuples(st.floats(-180, 180), st.floats(3, 90))
 
 
 @st.composite
-def heaps(draw: st.DrawFn) -> list[Block]:
+def heaps(draw):
     """Three to six blocks in one another's way, in any orientation."""
     reach = st.floats(-0.1, 0.1)
     return [
@@ -40,34 +39,32 @@ def heaps(draw: st.DrawFn) -> list[Block]:
     ]
 
 
-def props_of(blocks: list[Block]) -> list[Prop]:
+def props_of(blocks):
     return [
         Prop(drawn_mesh(one.type), COLOR_RGB[COLORS[place % len(COLORS)]], Pose.goal(one))
         for place, one in enumerate(blocks)
     ]
 
 
-def triangles_m(prop: Prop) -> NDArray[np.float64]:
+def triangles_m(prop):
     rotation = quat_xyzw_to_matrix(prop.pose.quat_xyzw)
     return prop.mesh.corners_m @ rotation.T + prop.pose.position_m
 
 
-def camera_on(props: list[Prop], view: tuple[float, float]) -> Camera:
+def camera_on(props, view):
     corners = np.vstack([triangles_m(prop).reshape(-1, 3) for prop in props])
     return frame(corners, view_axes(*view), Window(-0.85, 0.85, -0.85, 0.85), 0.3)
 
 
-def light_of(camera: Camera) -> Light:
+def light_of(camera):
     return Light(light_direction(camera), 0.5, 0.5)
 
 
-def drawn(props: list[Prop], camera: Camera) -> Raster:
+def drawn(props, camera):
     return draw(props, camera, light_of(camera), SIZE_PX)
 
 
-def hits(
-    starts: NDArray[np.float64], ways: NDArray[np.float64], corners: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def hits(starts, ways, corners):
     """Return the distance along each ray (n, 3) to a triangle, inf for none, and the normal."""
     one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     crossed = np.cross(ways[:, None], two)
@@ -83,28 +80,24 @@ def hits(
     return met.min(axis=1), normals / np.linalg.norm(normals, axis=1, keepdims=True)
 
 
-def rays(camera: Camera, pixels: NDArray[np.int64]) -> NDArray[np.float64]:
+def rays(camera, pixels):
     """Directions of unit depth through the centers of pixels (n, 2), row and column."""
     across = ((pixels[:, 1] + 0.5) / SIZE_PX * 2 - 1) * camera.half_tangent
     up = (1 - (pixels[:, 0] + 0.5) / SIZE_PX * 2) * camera.half_tangent
     return np.stack([across, up, np.ones(len(pixels))], axis=1) @ camera.axes
 
 
-def some_pixels(seed: int, n: int = RAYS) -> NDArray[np.int64]:
+def some_pixels(seed, n=RAYS):
     return np.random.default_rng(seed).integers(0, SIZE_PX, (n, 2))
 
 
-def met_by(
-    props: list[Prop], starts: NDArray[np.float64], ways: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def met_by(props, starts, ways):
     """Return distances along rays to props, (k, n), inf for none, and normals, (k, n, 3)."""
     found = [hits(starts, ways, triangles_m(prop)) for prop in props]
     return np.stack([away for away, _ in found]), np.stack([normals for _, normals in found])
 
 
-def is_hidden(
-    props: list[Prop], points: NDArray[np.float64], way: NDArray[np.float64]
-) -> NDArray[np.bool_]:
+def is_hidden(props, points, way):
     """True if anything stands in the way from points (n, 3)."""
     away, _ = met_by(props, points, np.broadcast_to(way, points.shape))
     return np.isfinite(away).any(axis=0)

@@ -5,21 +5,18 @@ import math
 import re
 import shutil
 from collections import Counter
-from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 import pytest
 
 from phyblock import registry
-from phyblock.domain.scene import AssemblyTask
 from phyblock.errors import SpecError
-from phyblock.records.record import Record
 from phyblock.results.compare import comparable, compare_models
 from phyblock.results.estimates import Headline
-from phyblock.results.load import Run, load_run, track_measures
+from phyblock.results.load import load_run, track_measures
 from phyblock.results.tables import write_tables
 from phyblock.run.rescore import rescore
 from phyblock.scoring.plan import mean_of, ratio_of
@@ -27,10 +24,10 @@ from phyblock.tracks.base import Judgement, SceneTrack, kind_of
 from phyblock.tracks.full_planning import FullPlanning
 from phyblock.tracks.measures import LayoutColumn, Measure, SampleCounts, TrackReport
 from phyblock.web.board import SiteRun, Sources, board_of, entries_of, values_of
-from tests.workspace import Workspace, call, csv_rows, write_lines, write_questions
+from tests.workspace import call, csv_rows, write_lines, write_questions
 
 
-def needless_steps(task: Any, record: Any) -> tuple[float, float]:
+def needless_steps(task, record):
     """Steps that name a block more often than the goal has it, and all steps."""
     plan = record.parse.plan
     needed = Counter(block.look for block in task.scene.blocks)
@@ -54,11 +51,11 @@ LATER = ("blocks", "kept")
 
 
 @pytest.fixture
-def add() -> Iterator[Callable[[str, Measure], None]]:
+def add():
     """Adds measures to tracks; they are gone after the test."""
     added: list[tuple[str, Measure]] = []
 
-    def add(track: str, measure: Measure) -> None:
+    def add(track, measure):
         registry.add_measure(track, measure)
         added.append((track, measure))
 
@@ -68,7 +65,7 @@ def add() -> Iterator[Callable[[str, Measure], None]]:
 
 
 @pytest.fixture
-def here(inside: Workspace) -> Workspace:
+def here(inside):
     inside.write_suite(models=["oracle", "all-candidates"])
     return inside
 
@@ -132,7 +129,7 @@ def test_a_track_counts_all_that_its_own_measures_need(track):
     assert needed == {one for one in kind.counted if one.sample is not None}
 
 
-def count_blocks(item: AssemblyTask, record: Record) -> tuple[float, float, float]:
+def count_blocks(item, record):
     off = abs((record.parse["number"] or 0) - len(item.scene))
     return off, off == 0, 1
 
@@ -158,10 +155,10 @@ class Counting(SceneTrack):
     counted = (COUNTS,)
 
     @classmethod
-    def report(cls) -> TrackReport:
+    def report(cls):
         return TrackReport((ERROR, EXACT), short="count_error")
 
-    def judge(self, item: AssemblyTask, text: str | None) -> Judgement:
+    def judge(self, item, text):
         del item
         found = re.findall(r"\d+", text or "")
         number = int(found[-1]) if found else None
@@ -169,7 +166,7 @@ class Counting(SceneTrack):
         return Judgement(bool(found), {"parse": parse})
 
 
-def led_by(leading: Measure, *measures: Measure) -> type[Counting]:
+def led_by(leading, *measures):
     """The track with these measures, the leading one behind what stands first."""
     columns = tuple(LayoutColumn({m.name: m.heading}, main=m is leading) for m in measures)
     report = replace(Counting.report(), measures=measures, headline=columns)
@@ -177,7 +174,7 @@ def led_by(leading: Measure, *measures: Measure) -> type[Counting]:
 
 
 @pytest.fixture
-def run(here: Workspace) -> Iterator[Run]:
+def run(here):
     registry.register_track(Counting)
     here.write_suite(tracks=["counting"], models=["oracle", "random"])
     assert not call("run", "suite.yaml", "--out", "out", "--no-report")
@@ -185,7 +182,7 @@ def run(here: Workspace) -> Iterator[Run]:
     registry.unregister_track(Counting.name)
 
 
-def show(kind: type[Counting]) -> None:
+def show(kind):
     registry.unregister_track(Counting.name)
     registry.register_track(kind)
 
@@ -210,11 +207,11 @@ def test_what_a_track_has_not_is_refused():
         call("play", "suite.yaml", "--name", "ada")
 
 
-def first_is_placed(_: Any, record: Any) -> tuple[float, float]:
+def first_is_placed(_, record):
     return record.outcomes[:1] == ("placed",), 1
 
 
-def is_right(_: Any, record: Any) -> tuple[float, float]:
+def is_right(_, record):
     return record.answer.correct, 1
 
 

@@ -1,8 +1,6 @@
 """Answers without a model: guesses of questions, plans without the goal, picks of people."""
 
-from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -40,17 +38,13 @@ from tests.shipped import TASKS
 WORDS = ("cube", "arch", "cylinder", "cuboid", "cone", "prism")
 
 
-def question(
-    number: int, options: tuple[str, ...], answer: tuple[int, ...], subtask: str = "SH"
-) -> Question:
+def question(number, options, answer, subtask="SH"):
     scene = Scene(f"s{number}", (2,), (), (f"base{number % 40}",))
     text = f"Which one is it, {WORDS[number % 6]} or not?"
     return Question(f"{subtask.lower()}-{number}", subtask, scene, text, options, answer)
 
 
-def made_by(
-    rule: Callable[[np.random.Generator], tuple[list[str], int]], n: int = 200
-) -> list[Question]:
+def made_by(rule, n=200):
     rng = np.random.default_rng(3)
     found = []
     for number in range(n):
@@ -59,11 +53,11 @@ def made_by(
     return found
 
 
-def fair(rng: np.random.Generator) -> tuple[list[str], int]:
+def fair(rng):
     return [str(word) for word in rng.permutation(WORDS)[:4]], int(rng.integers(4))
 
 
-def cube_is_right(rng: np.random.Generator) -> tuple[list[str], int]:
+def cube_is_right(rng):
     options, _ = fair(rng)
     options[0] = "cube"
     options[1:] = [word for word in rng.permutation(WORDS) if word != "cube"][:3]
@@ -71,12 +65,12 @@ def cube_is_right(rng: np.random.Generator) -> tuple[list[str], int]:
     return [str(options[int(place)]) for place in order], list(order).index(0)
 
 
-def largest_is_right(rng: np.random.Generator) -> tuple[list[str], int]:
+def largest_is_right(rng):
     numbers = rng.integers(0, 100_000, 4)
     return [f"{number} cm" for number in numbers], int(numbers.argmax())
 
 
-def most_alike_is_right(rng: np.random.Generator) -> tuple[list[str], int]:
+def most_alike_is_right(rng):
     a, b, c, d, e, f = (str(one) for one in rng.permutation(WORDS))
     options = [f"{a} {b}", f"{a} {c}", f"{d} {b}", f"{e} {f}"]
     order = rng.permutation(4)
@@ -86,7 +80,7 @@ def most_alike_is_right(rng: np.random.Generator) -> tuple[list[str], int]:
 LEARNERS = (majority_rule, text_rule)
 
 
-def accuracy(learn: Any, questions: list[Question]) -> float:
+def accuracy(learn, questions):
     guesses = Guesses(questions, learn)
     return sum(guesses.guess(one) == one.answer for one in questions) / len(questions)
 
@@ -136,7 +130,7 @@ def test_letters_of_pictures_and_orders_go_by_frequency():
 KIT = tuple(Candidate(*kind, (0.0, 0.0, 0.0)) for kind in KIT_PALETTE)
 
 
-def scene(name: str, needed: tuple[Candidate, ...], parents: tuple[str, ...] = ()) -> Scene:
+def scene(name, needed, parents=()):
     """Blocks beside one another: any order is right."""
     blocks = tuple(
         Block(order, one.type, one.color, (0.0, 0.0, 0.0), one.euler_deg, (), 1)
@@ -146,7 +140,7 @@ def scene(name: str, needed: tuple[Candidate, ...], parents: tuple[str, ...] = (
 
 
 @st.composite
-def drawn_sets(draw: st.DrawFn) -> tuple[list[Scene], dict[str, CandidateSet]]:
+def drawn_sets(draw):
     """Scenes of one to three blocks, some of them made from others, each with a set of the kit."""
     scenes: list[Scene] = []
     sets = {}
@@ -281,11 +275,11 @@ def test_numbers_that_are_lacking_or_not_allowed_are_refused(numbers):
         picking.reply([Pick(0, numbers)])
 
 
-def joined(picks: Sequence[Pick]) -> str:
+def joined(picks):
     return "-".join(str(pick.place) for pick in picks)
 
 
-def picking(least: int = 1, most: int = 3, *, repeats: bool = False) -> Picking:
+def picking(least=1, most=3, *, repeats=False):
     choices = pick_plan(PlanSubject(TASK.scene, TASK.candidates)).choices[:4]
     return Picking(choices, least, most, repeats, "step", joined)
 

@@ -3,7 +3,6 @@
 import sys
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 import pytest
 from hypothesis import given
@@ -18,11 +17,11 @@ from tests.tracks.conftest import track_of
 
 
 @pytest.fixture(scope="module")
-def track(tasks: tuple[AssemblyTask, ...]) -> Any:
+def track(tasks):
     return track_of("full_planning", tasks, scoring={"level1": "selection"})
 
 
-def steps(*numbers: int) -> str:
+def steps(*numbers):
     return "\n".join(f"Step{i}: Move block with index {n}" for i, n in enumerate(numbers, 1))
 
 

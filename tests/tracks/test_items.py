@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.domain.scene import AOVGraph, AssemblyTask, Candidate, CandidateSet
+from phyblock.domain.scene import AOVGraph, Candidate, CandidateSet
 from phyblock.errors import DataError
 from phyblock.records.record import Reply
 from phyblock.tracks.base import file_plan, in_order, presented, shown_order, spread, stratified
@@ -70,7 +70,7 @@ def test_orders_stay_as_they_were_drawn(tasks):
 
 @given(st.integers(0, 4), seeds, plans)
 def test_a_plan_is_worth_the_same_in_either_numbering(tasks, place, seed, plan):
-    def text(steps: Any) -> str:
+    def text(steps):
         return "\n".join(f"Step{i}: Move block with index {n}" for i, n in enumerate(steps, 1))
 
     task, track = tasks[place], _track("full_planning")
@@ -87,7 +87,7 @@ def test_a_plan_is_worth_the_same_in_either_numbering(tasks, place, seed, plan):
 _TRACKS: dict[str, Any] = {}
 
 
-def _track(name: str) -> Any:
+def _track(name):
     if name not in _TRACKS:
         more = {"steps": {"physics": "off"}} if name == "step_planning" else {}
         _TRACKS[name] = track_of(name, **more)
@@ -96,7 +96,7 @@ def _track(name: str) -> Any:
 
 @given(st.integers(0, 4), seeds, st.lists(st.integers(-1, 18), max_size=5))
 def test_an_episode_goes_the_same_in_either_numbering(tasks, place, seed, moves):
-    async def play(task: AssemblyTask, steps: Any) -> dict[str, Any]:
+    async def play(task, steps):
         episode = _track("step_planning").start(task, 0, {}, with_messages=False)
         for step in steps:
             if await episode.request() is None:
@@ -119,7 +119,7 @@ def test_a_plain_presentation_changes_nothing(tasks):
 
 
 @st.composite
-def graphs(draw: st.DrawFn) -> AOVGraph:
+def graphs(draw):
     """A graph of up to six blocks, each on some of those before it."""
     return AOVGraph(
         tuple(

@@ -2,9 +2,7 @@
 
 import asyncio
 import io
-from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from PIL import Image as PillowImage
@@ -12,7 +10,6 @@ from PIL import Image as PillowImage
 from phyblock.config.suite import ImagesSpec
 from phyblock.domain.scene import AssemblyTask
 from phyblock.errors import DataError, StoreError
-from phyblock.models.request import Image
 from phyblock.sim.pictures import candidates_png
 from phyblock.tracks.base import presented
 from phyblock.tracks.pictures import Workshop, picture_style, scene_drawings
@@ -25,12 +22,10 @@ GOAL_LAST = ImagesSpec(size_px=128, layout="separate", order=("candidates", "goa
 OWN = ImagesSpec(source="dataset")
 
 
-def draw(
-    folder: Path, images: ImagesSpec, tasks: Sequence[AssemblyTask]
-) -> tuple[list[tuple[Image, ...]], int]:
+def draw(folder, images, tasks):
     """Pictures of all tasks, asked for at once, and how many were drawn for them."""
 
-    async def ask() -> list[tuple[Image, ...]]:
+    async def ask():
         wanted = (shop.images(scene_drawings(task, images)) for task in tasks)
         return list(await asyncio.gather(*wanted))
 
@@ -41,11 +36,11 @@ def draw(
         shop.close()
 
 
-def keys(images: ImagesSpec, task: AssemblyTask) -> list[str]:
+def keys(images, task):
     return [drawing.key for drawing in scene_drawings(task, images)]
 
 
-def opened(image: Image) -> PillowImage.Image:
+def opened(image):
     with PillowImage.open(io.BytesIO(image.data)) as picture:
         return picture.convert("RGB")
 
@@ -89,7 +84,7 @@ def test_pictures_follow_what_is_shown(tasks, layout, shop):
     images = ImagesSpec(size_px=128, layout=layout)
     style = picture_style(images)
 
-    def sent(task: AssemblyTask) -> tuple[Image, ...]:
+    def sent(task):
         return asyncio.run(shop.images(scene_drawings(task, images)))
 
     plain = sent(tasks[0])
@@ -104,7 +99,7 @@ def test_pictures_follow_what_is_shown(tasks, layout, shop):
 
 
 @pytest.fixture
-def composite_task(tasks: tuple[AssemblyTask, ...], tmp_path: Path) -> AssemblyTask:
+def composite_task(tasks, tmp_path):
     """A task with a picture of its own: a red half, a gap, a blue half."""
     picture = PillowImage.new("RGB", (514, 256), "white")
     picture.paste("red", (0, 0, 255, 256))
@@ -140,7 +135,7 @@ def test_pictures_of_the_data_set_can_leave_out_the_goal(official_checkout):
     blind = presented(task, 0, "file", is_blind=True)
     separate = ImagesSpec(source="dataset", layout="separate")
 
-    def sent(images: ImagesSpec, task: AssemblyTask) -> tuple[Image, ...]:
+    def sent(images, task):
         return asyncio.run(Workshop(1).images(scene_drawings(task, images)))
 
     _, grid = sent(separate, task)

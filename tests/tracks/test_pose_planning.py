@@ -3,9 +3,7 @@
 import asyncio
 import functools
 import shutil
-from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -13,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from phyblock.domain.scene import AssemblyTask, Block, Candidate, CandidateSet, PoseStep
+from phyblock.domain.scene import Block, Candidate, CandidateSet, PoseStep
 from phyblock.errors import SpecError, StoreError
 from phyblock.parsing.poses import parse_poses
 from phyblock.records.files import known_records
@@ -26,7 +24,7 @@ from phyblock.sim.engine import Pose
 from phyblock.sim.geometry import center_cm, origin_m, put
 from phyblock.tracks import pose_planning as pose_track
 from phyblock.tracks.full_planning import PlanSubject
-from phyblock.tracks.pose_planning import POSE_RULES, PosePlanning, StepOutcome, written
+from phyblock.tracks.pose_planning import POSE_RULES, written
 from phyblock.types import REFUSED_ENDS, STEP_ENDS
 from tests.shipped import TASKS
 from tests.sim.structures import block_types, eulers
@@ -37,18 +35,18 @@ STANDS = "Step1: block 1 at (0, 0, 2.5)\nStep2: block 3 at (0, 0, 7.5)"
 
 
 @functools.cache
-def poses() -> PosePlanning:
+def poses():
     """The track, judging in this process."""
     return track_of("pose_planning", TASKS[:1])
 
 
 @pytest.fixture(scope="session")
-def task(tasks: tuple[AssemblyTask, ...]) -> AssemblyTask:
+def task(tasks):
     return tasks[0]
 
 
 @pytest.fixture(scope="session")
-def built_in() -> list[AssemblyTask]:
+def built_in():
     """Three scenes with arches, triangles and cylinders that are turned."""
     wanted = ("l1-001-animal", "l2-020", "l3-028-arcade")
     return [task for task in TASKS if task.key.startswith(wanted)]
@@ -116,7 +114,7 @@ def test_a_reply_is_read_scored_and_carried_out(task, text, right, ends, errors,
     assert judged(track, task, {**fields, **track.about(task)}, again) == record
 
 
-def worlds_of(put: Sequence[Block | None], steps: Sequence[StepOutcome]) -> list[tuple[Block, ...]]:
+def worlds_of(put, steps):
     """Return the blocks after each step, as the report shows them."""
     lying: dict[int, Block] = {}
     worlds = []
@@ -162,7 +160,7 @@ def test_without_poses_a_plan_is_scored_as_full_planning_scores_it(task, numbers
     assert poses().judge(task, written(steps)).fields["scores"] == wanted
 
 
-def fit(position_cm: float, up_cm: float, turn_deg: float = 0.0) -> PoseFit:
+def fit(position_cm, up_cm, turn_deg=0.0):
     return PoseFit(0, position_cm, (position_cm**2 - up_cm**2) ** 0.5, up_cm, turn_deg, 1.0)
 
 
@@ -197,7 +195,7 @@ def test_a_run_that_was_cut_goes_on_and_is_scored_again_without_an_engine(
     assert not call(*run)
     assert "Pose planning" in capsys.readouterr().out
 
-    def by_sample(records: list[dict[str, Any]]) -> dict[str, Any]:
+    def by_sample(records):
         kept = ("parse", "scores", "pose")
         return {one["sample"]: {name: one[name] for name in kept} for one in records}
 

@@ -2,7 +2,6 @@
 
 import contextlib
 import json
-from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
@@ -19,7 +18,7 @@ FACTS = {"pictures": ["goal", "candidates"], "n_candidates": 16, "candidate_scal
 MACROS = "{% macro twice(x) %}{{ x }}{{ x }}{% endmacro %}{% set rules = 'R' %}"
 
 
-def prompt(folder: Path, body: str, **files: str) -> TemplatePrompt:
+def prompt(folder, body, **files):
     """A template with this block `user`, or with blocks of its own; other files are `NAME.j2`."""
     for name, text in files.items():
         (folder / f"{name}.j2").write_text(text, encoding="utf-8")

@@ -2,24 +2,21 @@
 
 import itertools
 from collections import Counter
-from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.data.base import Dataset, QuestionSet, QuestionTask
+from phyblock.data.base import QuestionSet, QuestionTask
 from phyblock.data.questions import read_questions
-from phyblock.domain.question import LETTERS, SUBTASKS, Question, Subtask, rotated
+from phyblock.domain.question import LETTERS, SUBTASKS, Question, rotated
 from phyblock.domain.scene import Scene
-from phyblock.models.request import Image, Request
+from phyblock.models.request import Image
 from phyblock.sim.pictures import PictureStyle
 from phyblock.sim.question_pictures import question_key
 from phyblock.tracks import questions
-from phyblock.tracks.pictures import Workshop
 from phyblock.tracks.questions import (
     CHOICE_RULES,
     AskedQuestion,
@@ -37,11 +34,11 @@ OPTIONS = ("cube", "arch", "cylinder", "cuboid")
 
 
 @pytest.fixture(scope="module")
-def question_set(tmp_path_factory: pytest.TempPathFactory, towers: Dataset) -> QuestionSet:
+def question_set(tmp_path_factory, towers):
     return read_questions(write_questions(tmp_path_factory.mktemp("vqa") / "q"), towers)
 
 
-def opened(found: QuestionSet, shop: Workshop | None, size_px: int = 128, **vqa: Any) -> Vqa:
+def opened(found, shop, size_px=128, **vqa):
     """The track on a set of questions that is in no file."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(questions, "open_questions", lambda *_: found)
@@ -49,26 +46,26 @@ def opened(found: QuestionSet, shop: Workshop | None, size_px: int = 128, **vqa:
     return track
 
 
-def of_tasks(found: QuestionSet, tasks: Sequence[QuestionTask]) -> QuestionSet:
+def of_tasks(found, tasks):
     return QuestionSet("some", found.root, tuple(tasks))
 
 
 @in_a_loop
-async def ask(track: Vqa, *keys: str, seed: int = 0) -> list[Request]:
+async def ask(track, *keys, seed=0):
     items = [item for item in track.items if not keys or item.key in keys]
     shown = [track.shown(item, seed) for item in items]
     return [await track.request(item, seed, {}, with_messages=True) for item in shown]
 
 
-def user_parts(request: Request) -> tuple[str | Image, ...]:
+def user_parts(request):
     return request.messages[-1].parts
 
 
-def images(request: Request) -> list[Image]:
+def images(request):
     return [part for part in user_parts(request) if isinstance(part, Image)]
 
 
-def text_of(request: Request) -> str:
+def text_of(request):
     last = user_parts(request)[-1]
     assert isinstance(last, str)
     return last
@@ -86,7 +83,7 @@ def test_the_answer_stands_in_no_message(question_set, shop):
     assert [r.messages for r in asked] == [r.messages for r in again]
 
 
-def _other(answer: tuple[int, ...]) -> tuple[int, ...]:
+def _other(answer):
     return tuple((index + 1) % 4 for index in answer)
 
 
@@ -100,7 +97,7 @@ def test_a_rotation_keeps_what_is_right_and_rotations_add_up(question_set, first
     assert rotated(question, 0) == question
 
 
-def _meaning(question: Question, index: int) -> object:
+def _meaning(question, index):
     """Return an option: its picture, its place in the world, or its words."""
     letter = LETTERS[index]
     for picture in question.pictures:
@@ -145,7 +142,7 @@ def test_random_answers_are_spread_over_all_that_can_be_given(question_set):
     assert (sizes, len(found["OR"])) == ({4}, 24)
 
 
-def task_of(number: int, subtask: Subtask) -> QuestionTask:
+def task_of(number, subtask):
     scene = Scene(f"s{number}", (number % 4 + 1,), (), ())
     question = Question(f"q{number}", subtask, scene, "?", ("a", "b", "c", "d"), (0,))
     return QuestionTask(question)
@@ -171,7 +168,7 @@ def test_no_more_than_wanted_of_each_and_in_all(given_tasks, subtasks, per_subta
 
 @given(tasks, some, st.integers(1, 5), st.integers(1, 40))
 def test_a_higher_limit_asks_all_that_a_lower_one_asks(given_tasks, subtasks, per_subtask, limit):
-    def keys(most_of_each: int | None, most: int | None) -> set[str]:
+    def keys(most_of_each, most):
         kept = select_questions(given_tasks, subtasks, LEVELS, most_of_each, most)
         return {task.key for task in kept}
 

@@ -6,7 +6,7 @@ import json
 import re
 import zlib
 from collections.abc import Callable
-from typing import Any, get_args
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -14,14 +14,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from phyblock.domain.scene import AssemblyTask, Block, Candidate, CandidateSet, Scene
-from phyblock.models.request import Image, Message, Request
+from phyblock.models.request import Image, Request
 from phyblock.parsing.move import MOVE_PROBLEMS
 from phyblock.records.record import Reply
 from phyblock.run.estimate import has_all_pictures
 from phyblock.scoring.steps import MOVE_OUTCOMES
 from phyblock.tracks.pictures import Workshop
-from phyblock.tracks.step_planning import ENDINGS, STEP_RULES, Feedback, PastStep, StepPlanning
-from phyblock.types import SETTINGS, Setting
+from phyblock.tracks.step_planning import ENDINGS, STEP_RULES, Feedback, PastStep
+from phyblock.types import SETTINGS
 from tests.parsing.test_replies import REPLIES
 from tests.shipped import TASKS, official_tasks
 from tests.tracks.conftest import seesaw, track_of
@@ -31,18 +31,18 @@ OPEN = {"max_failures": None, "max_repeats": None}
 Agent = Callable[[Request], Reply | str]
 
 
-def made(form: str = "text", shop: Workshop | None = None, **steps: Any) -> StepPlanning:
+def made(form="text", shop=None, **steps):
     """The track; nothing is simulated unless that is asked for."""
     return _made(form, shop, json.dumps({"physics": "off", **steps}))
 
 
 @functools.cache
-def _made(form: str, shop: Workshop | None, steps: str) -> Any:
+def _made(form, shop, steps):
     fields = {"answer_format": form, "steps": json.loads(steps)}
     return track_of("step_planning", TASKS[:1], shop, **fields)
 
 
-def tower(*colors: str) -> AssemblyTask:
+def tower(*colors):
     """Cubes one on another; candidates are five colors of cube, and a red arch that is no use."""
     blocks = tuple(
         Block(i, "cube", c, (0, 0, 0.05 * i - 0.025), (0, 0, 0), (i - 1,) if i > 1 else (), i)
@@ -53,28 +53,26 @@ def tower(*colors: str) -> AssemblyTask:
     return AssemblyTask(Scene("tower", (3,), blocks, ("tower",)), CandidateSet((*cubes, arch)))
 
 
-def scripted(*texts: str) -> Agent:
+def scripted(*texts):
     """Says these texts one after another, then Done."""
     left = list(texts)
     return lambda _: left.pop(0) if left else "Done"
 
 
-def baseline(name: str) -> Agent:
+def baseline(name):
     rule = STEP_RULES[name]
 
-    def ask(request: Request) -> str:
+    def ask(request):
         seed = zlib.crc32(f"{name} {request.key} {request.seed}".encode())
         return rule(request.subject, np.random.default_rng(seed))
 
     return ask
 
 
-def play(
-    task: AssemblyTask, agent: Agent, track: StepPlanning | None = None, seed: int = 0
-) -> tuple[dict[str, Any], list[Request]]:
+def play(task, agent, track=None, seed=0):
     episode = (track or made(**OPEN)).start(task, seed, {}, with_messages=False)
 
-    async def requests() -> list[Request]:
+    async def requests():
         asked = []
         while (request := await episode.request()) is not None:
             asked.append(request)
@@ -87,7 +85,7 @@ def play(
     return dict(episode.judgement().fields), asked
 
 
-def scores(fields: dict[str, Any], criterion: str, setting: Setting = "A") -> tuple[int, int, int]:
+def scores(fields, criterion, setting="A"):
     (found,) = [
         s for s in fields["scores"] if (s["criterion"], s["setting"]) == (criterion, setting)
     ]
@@ -260,15 +258,15 @@ def test_outlines_are_as_many_as_an_episode_can_have():
     assert [len(list(made(**one).outlines(task))) for one in rules] == [4, 1]
 
 
-def past(*outcomes: str) -> list[PastStep]:
+def past(*outcomes):
     return [PastStep(f"Move({n})", outcome, n) for n, outcome in enumerate(outcomes, 1)]
 
 
-def text(message: Message) -> str:
+def text(message):
     return next(part for part in message.parts if isinstance(part, str))
 
 
-def pictures(message: Message) -> list[bytes]:
+def pictures(message):
     return [part.data for part in message.parts if isinstance(part, Image)]
 
 
@@ -300,7 +298,7 @@ def test_feedback_tells_no_more_than_it_may(feedback):
 def test_pictures_of_states_are_drawn_and_kept(tmp_path):
     """An episode sees one picture a state; a second episode finds them all."""
 
-    async def play(track: StepPlanning, task: AssemblyTask) -> list[list[bytes]]:
+    async def play(track, task):
         episode = track.start(task, 0, {}, with_messages=True)
         seen = []
         while (request := await episode.request()) is not None:

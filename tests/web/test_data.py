@@ -6,9 +6,6 @@ import math
 import re
 import zlib
 from bisect import bisect_right
-from collections.abc import Collection, Sequence
-from pathlib import Path
-from typing import Any
 
 import pytest
 from hypothesis import given
@@ -20,13 +17,12 @@ from phyblock.records.files import known_records
 from phyblock.records.record import Record
 from phyblock.results.estimates import Headline
 from phyblock.results.load import load_run
-from phyblock.results.tables import TablesWritten, write_tables
+from phyblock.results.tables import write_tables
 from phyblock.web.board import SiteRun, Sources, board_of, entries_of
 from phyblock.web.leaderboard import check_runs, write_site
 from phyblock.web.pack import Pack, pack_samples
 from phyblock.web.report import write_report
 from tests.web.factory import laws, manifest, record, record_lists, run_of, score, write_run
-from tests.workspace import Workspace
 
 JSON = st.recursive(
     st.none() | st.booleans() | st.integers() | st.text(),
@@ -36,14 +32,14 @@ JSON = st.recursive(
 SCENES = [str(number) for number in range(12)]
 
 
-def unpacked(script: Path) -> Any:
+def unpacked(script):
     """The data of a script: JSON, deflated, in base 64."""
     text = script.read_text(encoding="ascii")
     (packed,) = re.findall(r"^phyblockTake\('[^']*','[^']*','([A-Za-z0-9+/=]*)'\)\n$", text)
     return json.loads(zlib.decompress(base64.b64decode(packed)))
 
 
-def entries_in(folder: Path, starts: Sequence[int], kind: str = "records") -> list[Any]:
+def entries_in(folder, starts, kind="records"):
     chunks = [unpacked(folder / f"{kind}-{n}.js") for n in range(len(starts))]
     return [entry for chunk in chunks for entry in chunk]
 
@@ -51,13 +47,13 @@ def entries_in(folder: Path, starts: Sequence[int], kind: str = "records") -> li
 class Report:
     """A page's reading of a folder of scripts."""
 
-    def __init__(self, run: Path, data: Path | None = None, made: TablesWritten | None = None):
+    def __init__(self, run, data=None, made=None):
         path = write_report(made or write_tables(run), data)
         self.page = path.read_text(encoding="utf-8")
         self.folder = run / self.page.partition('data-folder="')[2].partition('"')[0]
         self.index = unpacked(self.folder / "samples.js")
 
-    def entry(self, kind: str, number: int) -> Any:
+    def entry(self, kind, number):
         starts = self.index["starts"][kind]
         chunk = bisect_right(starts, number) - 1
         return unpacked(self.folder / f"{kind}-{chunk}.js")[number - starts[chunk]]
@@ -175,12 +171,12 @@ def test_boards_say_what_tables_say(made):
                 assert shown == [None if math.isnan(n) else round(n, 4) for n in wanted]
 
 
-def tree(folder: Path) -> dict[str, bytes]:
+def tree(folder):
     files = (path for path in folder.rglob("*") if path.is_file())
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
 
 
-def data_of(runs: Workspace) -> list[Path]:
+def data_of(runs):
     return [runs.root / "data", runs.root / "questions"]
 
 
@@ -201,9 +197,7 @@ def test_runs_and_bundles_become_one_folder_the_same_every_time(runs, tmp_path):
     assert not {"prompt", "time", "counts"} & shown
 
 
-def planned(
-    seed: int = 0, rules: Sequence[str] = (), left_out: Collection[str] = (), **right: int
-) -> SiteRun:
+def planned(seed=0, rules=(), left_out=(), **right):
     """A run of models by how many of four steps of every scene they have right; `rules` are
     baselines among them, and of scenes `left_out` the first has no record.
     """
@@ -220,11 +214,11 @@ def planned(
 
 
 def test_only_whole_models_have_ranks():
-    def board(*runs: SiteRun) -> dict[str, dict[str, Any]]:
+    def board(*runs):
         rows = board_of(runs, entries_of(runs))["rows"]
         return {row["name"]: row for row in rows}
 
-    def ranks_of(*runs: SiteRun) -> dict[str, Any]:
+    def ranks_of(*runs):
         return {name: row["ranks"].get("full_planning") for name, row in board(*runs).items()}
 
     # Models without a common sample are not told apart.
@@ -239,11 +233,11 @@ def test_only_whole_models_have_ranks():
     assert lacking == f"1 of {len(SCENES)} answered"
 
 
-def site_run(where: str, **facts: Any) -> SiteRun:
+def site_run(where, **facts):
     return SiteRun(where, run_of([], manifest(**facts)), Sources())
 
 
-def in_track(track: str, **more: Any) -> dict[str, Any]:
+def in_track(track, **more):
     """Facts of a run of one track alone, with its identity."""
     facts = manifest()
     return {
@@ -266,13 +260,13 @@ def test_a_model_asked_different_things_is_one_row_and_the_same_things_two():
     assert len(set(names)) == len(names)
 
 
-def shown(images: dict[str, Any], digest: str) -> dict[str, Any]:
+def shown(images, digest):
     facts = in_track("full_planning")
     tracks = {"full_planning": {**facts["tracks"]["full_planning"], "pictures": digest}}
     return {"suite": {**facts["suite"], "images": images}, "tracks": tracks}
 
 
-def of_data(name: str = "d", sha256: str = "0", version: int = 2) -> dict[str, Any]:
+def of_data(name="d", sha256="0", version=2):
     return {"dataset": {"name": name, "sha256": sha256 * 64, "version": version}}
 
 
@@ -319,7 +313,7 @@ def test_a_build_that_was_stopped_never_looks_whole_and_what_is_not_ours_stays(
     (out / "CNAME").write_text("example.org")
     before = tree(out)
 
-    def stopped(*_: object, **__: object) -> str:
+    def stopped(*_, **__):
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patched:

@@ -17,14 +17,14 @@ from tests.web.conftest import HOSTILE, NAME, PageVisit, expect
 from tests.web.factory import manifest, write_run
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Page
+    pass
 
 Visiting = Callable[..., PageVisit]
 PHONE = {"width": 390, "height": 844}
 WIDE = "document.documentElement.scrollWidth <= innerWidth"
 
 
-def painted(page: Page, selector: str) -> int:
+def painted(page, selector):
     """Return the number of pixels of a canvas that are drawn."""
     script = """canvas => {
         const copy = new OffscreenCanvas(canvas.width, canvas.height);
@@ -386,7 +386,7 @@ def test_hostile_replies_do_nothing(visit):
     visit.complaints.clear()
 
 
-def sample(track: str, model: str, key: str, **more: str) -> tuple[str, dict[str, str]]:
+def sample(track, model, key, **more):
     return "samples", {"s": f"{track}/{model}/{key}/s0", **more}
 
 

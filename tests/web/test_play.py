@@ -7,8 +7,6 @@ import socket
 import struct
 import threading
 import time
-from collections.abc import Iterator, Sequence
-from pathlib import Path
 from typing import NamedTuple
 
 import pytest
@@ -18,7 +16,6 @@ from hypothesis import strategies as st
 from phyblock.config.suite import load_suite
 from phyblock.errors import SpecError
 from phyblock.models.request import HaltedError, Image, Message, Request
-from phyblock.run.runner import RunResult
 from phyblock.tracks.picking import Choice, Pick, Picking
 from phyblock.web.server import LARGEST_BODY_BYTES, Server
 from phyblock.web.session import NotNowError, Person, PlaySession, plan_session
@@ -36,14 +33,14 @@ PICKING = Picking(
 
 
 class Clock:
-    def __init__(self) -> None:
+    def __init__(self):
         self.now = 0.0
 
-    def __call__(self) -> float:
+    def __call__(self):
         return self.now
 
 
-async def asked(clock: Clock) -> tuple[PlaySession, asyncio.Task[tuple[str, float]]]:
+async def asked(clock):
     """A session before its beginning, and its first question."""
     session = PlaySession(2, clock)
     session.welcome("ada")
@@ -74,7 +71,7 @@ async def test_nothing_is_shown_before_the_beginning_and_no_name_or_answer_ever(
 
 
 def test_the_clock_runs_from_the_first_look_and_stands_still_in_pauses():
-    async def play() -> tuple[str, float]:
+    async def play():
         clock = Clock()
         session, task = await asked(clock)
         for now, act in (
@@ -111,14 +108,14 @@ async def test_an_answer_counts_once_and_only_for_what_lies_there():
     assert session.state(-1)["phase"] == "waiting"
 
 
-def played(suite: Path, picks: Sequence[int]) -> tuple[RunResult, list[str]]:
+def played(suite, picks):
     """Sit down, pick these one after another, and close the sitting; what was shown."""
     person = Person("ada")
     plan = plan_session(load_suite(suite), person, None)
     session = PlaySession(plan.samples_per_model)
     shown: list[str] = []
 
-    async def sat() -> RunResult:
+    async def sat():
         left = list(picks)
         run = asyncio.create_task(session.run(plan, person, suite.parent / "out", lambda: None))
         while not run.done():
@@ -169,19 +166,19 @@ def test_a_warm_up_on_another_scene_of_level_1_is_shown_how_it_went_and_not_kept
 
 
 @pytest.fixture(scope="module")
-def session() -> PlaySession:
+def session():
     session = PlaySession(1)
     session.welcome("ada")
     return session
 
 
 @pytest.fixture(scope="module")
-def server(session: PlaySession) -> Iterator[Server]:
+def server(session):
     with Server(session) as running:
         yield running
 
 
-def token(server: Server) -> str:
+def token(server):
     return server.address.rstrip("/").rpartition("/")[2]
 
 
@@ -191,13 +188,7 @@ class Answer(NamedTuple):
     body: bytes
 
 
-def ask(
-    server: Server,
-    method: str = "GET",
-    path: str = "/{token}/state",
-    body: bytes | None = None,
-    **headers: str | None,
-) -> Answer:
+def ask(server, method="GET", path="/{token}/state", body=None, **headers):
     """A request as a page of the server makes it, but for what is given; None leaves out."""
     usual: dict[str, str | None] = {"Host": server.hosts[0]}
     if method == "POST":
@@ -302,12 +293,12 @@ def test_what_is_no_answer_is_refused_and_changes_nothing(server, session, statu
     assert session.state(-1) == before
 
 
-def is_busy() -> bool:
+def is_busy():
     """True if a server's thread answers a request."""
     return any("process_request_thread" in thread.name for thread in threading.enumerate())
 
 
-def until_idle() -> None:
+def until_idle():
     """Wait until every request is through."""
     end = time.monotonic() + 10
     while is_busy():
@@ -329,7 +320,7 @@ def test_only_files_that_were_named_are_served_and_a_fault_of_ours_is_seen(serve
     assert "FileNotFoundError" in capfd.readouterr().err
 
 
-def send(server: Server, content: bytes) -> socket.socket:
+def send(server, content):
     connection = socket.create_connection(("127.0.0.1", server.server_port), timeout=10)
     connection.sendall(content)
     return connection

@@ -7,20 +7,19 @@ from __future__ import annotations
 
 import re
 import time
-from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import pytest
 
 from tests.fork_server import Forked, fork_server
 from tests.web.conftest import Visit
-from tests.workspace import SCENES, Raw, Workspace, questions, read_lines, write_questions
+from tests.workspace import SCENES, questions, read_lines, write_questions
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Page
+    from playwright.sync_api import Page
 
 SUBTASKS = ("SH", "OR", "AD", "VP")
 PHONE = {"width": 390, "height": 780}
@@ -29,7 +28,7 @@ ADA = ("play", "suite.yaml", "--name", "ada")
 
 
 @pytest.fixture(scope="module")
-def workspace(new_workspace: Callable[..., Workspace]) -> Workspace:
+def workspace(new_workspace):
     """Three scenes and four questions, hostile texts in these; scenes are asked about without poses
     and with. A run of two baselines.
     """
@@ -63,7 +62,7 @@ class Sat:
 
 
 @contextmanager
-def sitting(browser: Browser, workspace: Workspace, **options: Any) -> Iterator[Sat]:
+def sitting(browser, workspace, **options):
     """A page at the address that a browser is started with; it asks for nothing elsewhere."""
     command = [*ADA, "--out", "ada", "--beside", "out"]
     with fork_server().start(command, workspace.root, workspace.env) as process:
@@ -83,7 +82,7 @@ def sitting(browser: Browser, workspace: Workspace, **options: Any) -> Iterator[
             process.kill()
 
 
-def given_to_a_browser(note: Path) -> str:
+def given_to_a_browser(note):
     end = time.monotonic() + 20
     while not note.exists():
         assert time.monotonic() < end
@@ -93,7 +92,7 @@ def given_to_a_browser(note: Path) -> str:
     return address
 
 
-def opened(browser: Browser, address: str, **options: Any) -> Visit:
+def opened(browser, address, **options):
     context = browser.new_context(**{"viewport": {"width": 1300, "height": 900}, **options})
     visit = Visit(context.new_page())
     visit.page.goto(address)
@@ -101,26 +100,26 @@ def opened(browser: Browser, address: str, **options: Any) -> Visit:
     return visit
 
 
-def task(page: Page, number: int) -> None:
+def task(page, number):
     page.get_by_text(f"Task {number} of 10").wait_for()
     page.locator(".answer").wait_for()
 
 
-def answered(folder: Path) -> list[Raw]:
+def answered(folder):
     path = folder / "records.jsonl"
     lines = read_lines(path) if path.exists() else []
     return [one for one in lines if one["model"] == "human:ada"]
 
 
-def said(record: Raw) -> str:
+def said(record):
     return record["reply"]["text"]
 
 
-def plan(*numbers: int) -> str:
+def plan(*numbers):
     return "\n".join(f"Step{n}: Move block with index {one}" for n, one in enumerate(numbers, 1))
 
 
-def poses(*steps: str) -> str:
+def poses(*steps):
     return "\n".join(f"Step{n}: block {one}" for n, one in enumerate(steps, 1))
 
 
@@ -149,7 +148,7 @@ def test_a_sitting_by_mouse_keys_and_phone_over_a_kill(browser, workspace):
     assert done.code == 0, done.err
 
 
-def begin_with_mouse_and_keys(page: Page, run: Path) -> None:
+def begin_with_mouse_and_keys(page, run):
     page.get_by_role("button", name="Begin").click()
 
     task(page, 1)
@@ -173,7 +172,7 @@ def begin_with_mouse_and_keys(page: Page, run: Path) -> None:
     assert said(answered(run)[1]) == plan(12, 1, 7)
 
 
-def end_on_a_phone(page: Page, run: Path) -> None:
+def end_on_a_phone(page, run):
     page.get_by_text("Welcome back. 8 tasks of 10 are left").wait_for()
     page.get_by_role("button", name="Begin").tap()
     task(page, 3)
@@ -239,7 +238,7 @@ def end_on_a_phone(page: Page, run: Path) -> None:
     page.get_by_role("button", name="Finish").tap()
 
 
-def give_places_by_touch(page: Page) -> None:
+def give_places_by_touch(page):
     """The browser says what is no number of a field; picks are removed, and all is undone."""
     task(page, 8)
     fits_the_phone(page)
@@ -264,7 +263,7 @@ def give_places_by_touch(page: Page) -> None:
     submit.tap()
 
 
-def give_places_by_keys(page: Page) -> None:
+def give_places_by_keys(page):
     """Numbers of blocks by name, of places by arrows, over a reload in the middle of it."""
     task(page, 9)
     page.keyboard.press("5")
@@ -277,11 +276,11 @@ def give_places_by_keys(page: Page) -> None:
     page.keyboard.press("Control+Enter")
 
 
-def fits_the_phone(page: Page) -> None:
+def fits_the_phone(page):
     assert page.evaluate("document.documentElement.scrollWidth") <= PHONE["width"]
 
 
-def sent_to(page: Page) -> list[object]:
+def sent_to(page):
     """Texts of the prompt, which is one click away, and digests of the bytes of the pictures."""
     digest = """async image => {
         const bytes = await (await fetch(image.src)).arrayBuffer();
@@ -295,7 +294,7 @@ def sent_to(page: Page) -> list[object]:
     return [*texts, *pictures]
 
 
-def stored_prompt(run: Path, record: Raw) -> list[object]:
+def stored_prompt(run, record):
     prompts = {line["sha256"]: line for line in read_lines(run / "prompts.jsonl")}
     messages = prompts[record["prompt"]["messages"]]["messages"]
     parts = [part for message in messages for part in message["parts"]]
