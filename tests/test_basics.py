@@ -9,10 +9,9 @@ import signal
 import subprocess
 import sys
 import time
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from operator import truediv
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -81,7 +80,7 @@ def compensating(values, /, start=0):
 
 @given(st.lists(st.floats(-1e6, 1e6) | st.integers(-9, 9)))
 def test_values_are_added_one_after_another(values):
-    total: float = 0
+    total = 0
     for value in values:
         total += value
     assert (plain_sum(values), type(plain_sum(values))) == (total, type(total))
@@ -103,7 +102,7 @@ def solids():
 def fits():
     """Counts of how steps lie to goal blocks, as records hold them."""
     off = [PoseFit(n, 0.1 * n, 0.0, 0.0, 0.7 * n, 1 / (n + 1)) for n in range(30)]
-    records: list[Any] = [SimpleNamespace(pose=SimpleNamespace(steps=off[:n])) for n in range(30)]
+    records = [SimpleNamespace(pose=SimpleNamespace(steps=off[:n])) for n in range(30)]
     return [list(FITS.of(record)) for record in records]
 
 
@@ -138,7 +137,7 @@ def test_jobs_give_what_functions_give_or_raise():
 
 def test_a_process_that_is_killed_fails_its_own_job_alone():
     with WorkerPool(2) as pool:
-        jobs: list[Future[object]] = [pool.submit(die if n == 3 else abs, -n) for n in range(8)]
+        jobs = [pool.submit(die if n == 3 else abs, -n) for n in range(8)]
         done = [job.exception() or job.result() for job in jobs]
     assert isinstance(done.pop(3), WorkerDiedError)
     assert done == [0, 1, 2, 4, 5, 6, 7]
@@ -193,7 +192,7 @@ def test_answers_come_in_the_order_of_tasks(jobs, size):
 
 @pytest.mark.parametrize("at_once", [True, False])
 def test_shards_end_alike_at_once_or_one_after_another_and_go_on(tmp_path, at_once):
-    done: list[int] = []
+    done = []
 
     def counted_square(number):
         done.append(number)

@@ -12,7 +12,6 @@ import sys
 import warnings
 import zipfile
 from collections.abc import Callable
-from typing import Any
 
 import pytest
 import yaml
@@ -144,7 +143,7 @@ def put(place, value, track="", model="random"):
     """A change of one value: in the first record of a track and model, or in the manifest."""
 
     def change(records, manifest):
-        node: Any = of_track(records, track, model) if track else manifest
+        node = of_track(records, track, model) if track else manifest
         *above, last = (int(part) if part.isdigit() else part for part in place.split("."))
         for part in above:
             node = node[part]
@@ -179,7 +178,6 @@ def _no_models(records, manifest):
     records.clear()
 
 
-ZEROS = "0" * 64
 FORGED: dict[str, tuple[Change, str]] = {
     "score": (_score, "does not verify"),
     "answer": (_answer, RECORDS),

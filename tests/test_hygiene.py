@@ -69,7 +69,7 @@ def test_lock_files_agree_and_are_installed_with_their_hashes():
 
 
 def test_every_package_that_is_imported_is_declared():
-    imported: set[str] = set()
+    imported = set()
     for path in (path for package in PACKAGES for path in (ROOT / package).rglob("*.py")):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Import):

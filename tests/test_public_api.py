@@ -5,7 +5,6 @@ import itertools
 import pickle
 import re
 import typing
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from importlib.metadata import version
 from pathlib import Path
@@ -42,7 +41,7 @@ def test_the_guide_runs_and_every_object_shows_itself(tmp_path, monkeypatch, cap
     blocks = re.findall(r"```python\n(.*?)```", GUIDE.read_text("utf-8"), re.DOTALL)
     assert len(blocks) == 5
     assert blocks[0].count("\n") < 25, "one screen"
-    names: dict[str, typing.Any] = {}
+    names = {}
     for block in blocks:
         exec(compile(block, str(GUIDE), "exec"), names)
     assert "levels[0]" in capsys.readouterr().out
@@ -60,7 +59,7 @@ def test_what_is_wrong_is_named():
     stream = phyblock.tasks("full_planning", split="train")
     playing = phyblock.tasks("step_planning", limit=1)[0]
     scene, other = finite[0].item, finite[0].track.dataset.tasks[0]
-    wrong: dict[str, Callable[[], object]] = {
+    wrong = {
         "there is no such suite": lambda: phyblock.load_suite("quik"),
         "load_suite: suite: is too short": lambda: phyblock.load_suite(""),
         "--set limit=0": lambda: phyblock.load_suite("quick", "limit=0"),

@@ -19,7 +19,7 @@ from tests.data.broken import sound_scene, with_value, write_checkout
 from tests.fuzz.strategies import png_header
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
-from tests.workspace import Raw, Workspace, tower
+from tests.workspace import Workspace, tower
 
 Prepare = Callable[[Workspace], list[str]]
 RUN = ["run", "suite.yaml", "--out", "out"]
@@ -187,7 +187,7 @@ def without_field(field):
     """A record's line without one of its fields."""
 
     def change(line):
-        record: Raw = json.loads(line)
+        record = json.loads(line)
         del record[field]
         return json.dumps(record)
 
@@ -198,7 +198,7 @@ def manifest_without(field, *args):
     """The finished run's manifest lacks a field."""
 
     def change(workspace):
-        manifest: Raw = yaml.safe_load((workspace.out / "run.yaml").read_text(encoding="utf-8"))
+        manifest = yaml.safe_load((workspace.out / "run.yaml").read_text(encoding="utf-8"))
         del manifest[field]
         workspace.write_yaml("out/run.yaml", manifest)
 

@@ -77,7 +77,7 @@ def test_help_and_version_import_nothing_heavy():
 def test_every_option_that_messages_and_docs_name_is_there():
     root = Path(__file__).parents[2]
     written = [*root.glob("phyblock*/**/*.py"), root / "README.md", *root.glob("docs/**/*.md")]
-    named: set[tuple[str, ...]] = set()
+    named = set()
     for path in written:
         for call in CALLS.findall(path.read_text(encoding="utf-8")):
             before, *options = re.split(r"(?<!\S)(?=--)", call)

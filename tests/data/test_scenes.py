@@ -221,7 +221,7 @@ def test_a_missing_file_and_a_folder_in_its_place_are_named(tmp_path):
 def tasks(draw):
     """Any valid scene, with the candidates it needs and some that it does not."""
     n = draw(st.integers(1, 8))
-    blocks: list[Block] = []
+    blocks = []
     orders = draw(st.lists(st.integers(1, 99), min_size=n, max_size=n, unique=True))
     for order in orders:
         carriers = (

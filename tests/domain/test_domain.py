@@ -16,7 +16,6 @@ from phyblock.domain.blocks import (
     BLOCK_TYPES,
     SHAPES,
     BlockType,
-    Euler,
     euler_deg_to_quat_xyzw,
     orientation_class,
     quat_xyzw_to_matrix,
@@ -135,7 +134,7 @@ def test_whole_turns_change_nothing(block_type, euler_deg, turns):
 
 
 def test_on_the_official_data_classes_and_euler_angles_tell_the_same_apart(official_checkout):
-    used: dict[BlockType, set[Euler]] = {}
+    used = {}
     for task in official_tasks(official_checkout):
         for block in (*task.scene.blocks, *task.candidates.candidates):
             used.setdefault(block.type, set()).add(block.euler_deg)

@@ -4,7 +4,6 @@ import io
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import gymnasium
 import numpy as np
@@ -32,7 +31,7 @@ def rollout(env, seed, steps=30):
     """Everything that a random agent sees."""
     observation, info = env.reset(seed=seed)
     env.action_space.seed(seed)
-    seen: list[Any] = [(observation, info)]
+    seen = [(observation, info)]
     for _ in range(steps):
         observation, *rest = env.step(env.action_space.sample())
         seen.append((observation, *rest))

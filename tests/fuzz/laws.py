@@ -37,9 +37,6 @@ _LONGEST_S = 30.0
 _LONGEST_SHOWN = 1500
 _KEPT_FILES = ("records.jsonl", "calls.jsonl")
 
-Tree = Mapping[str, tuple[str, str]]
-"""What stands at each path below a folder: its kind, and the digest of a file or a link's end."""
-
 
 @dataclass(frozen=True)
 class Broken:

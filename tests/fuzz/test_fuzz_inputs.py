@@ -212,7 +212,7 @@ _IN_OUT = ("report/ch1/thesis.tex", "figures/mine.svg", "tables/mine.csv", "note
 
 def run_cases(root):
     """Cases about the finished runs in `root`: a line of a file that grows, or the manifest."""
-    found: list[Cases] = []
+    found = []
     for run, commands in _OF_RUN.items():
         own = tuple(f"{run}/{name}" for name in _IN_OUT) if run == "out" else ()
         for name in (*_GROWING, "run.yaml"):

@@ -13,7 +13,6 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -44,10 +43,10 @@ def known(official_checkout):
 @pytest.fixture(scope="module")
 def expected(official_checkout, known):
     """F1 of every recorded reply, by the scorer alone."""
-    scorers: dict[str, AssemblyScorer] = {}
-    found: Scores = {}
+    scorers = {}
+    found = {}
     for (model, key), text in reply_texts(official_checkout).items():
-        item: Any = known[key].item
+        item = known[key].item
         scorer = scorers.setdefault(key, AssemblyScorer(item.scene, item.candidates, ("A",)))
         plan = parse_plan(text, len(item.candidates), "official").plan
         (score,) = scorer.score(plan, ("paper",), None)
@@ -230,7 +229,7 @@ def test_trl(official_checkout, known, expected):
         return found
 
     check(official_checkout, expected, score)
-    names: dict[str, Any] = {}
+    names = {}
     exec(example("TRL"), names)
     first = names["tasks"][0]
     assert names["worth"](["Step 1: Move block with index 1"], [first.key]) == [

@@ -44,7 +44,7 @@ def built_in():
 
 def fresh(count, seed):
     """Base scenes of the grammar from another seed, in the shares of the built-in set."""
-    tasks: Tasks = []
+    tasks = []
     for share in shares(count):
         goals = (draw(Request(seed, "kit", share.group, n)) for n in range(9 * count))
         found = islice((goal for goal in goals if goal), share.base + share.varied)

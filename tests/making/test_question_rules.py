@@ -274,7 +274,7 @@ def test_options_that_are_taken_are_apart_and_one_is_right(seed):
 
 def test_no_rank_is_more_often_right_than_another():
     """The right one would always be the largest if it were not matched."""
-    ranks: Counter[int] = Counter()
+    ranks = Counter()
     for seed in range(200):
         rng, measures = drawn(seed, 14)
         measures[0, 0] += 1

@@ -402,7 +402,7 @@ def test_results_that_are_not_there_yet_are_not_taken_for_none(disk):
 def test_headers_that_requests_need_go_with_their_batch(disk):
     schema = {"type": "object", "properties": {}, "additionalProperties": False}
     form = {"type": "json_schema", "json_schema": {"name": "a", "strict": True, "schema": schema}}
-    betas: list[str] = []
+    betas = []
 
     class Noting(AnthropicBatches):
         def key_of(self, request):

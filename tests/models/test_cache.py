@@ -153,7 +153,7 @@ NO_REPLIES = ("{}", '{"text": 1', '{"text": "a", "usage": {}, "finish": "perhaps
 
 @pytest.mark.parametrize("content", [*NO_REPLIES, b"\xff\xfe\xfd", 7])
 def test_a_row_that_is_no_reply_is_missing_and_is_overwritten(tmp_path, content):
-    said: list[str] = []
+    said = []
     path = tmp_path / "c.sqlite"
     with ReplyCache(path) as cache:
         cache.put("k", "openai/m", REPLY)

@@ -135,7 +135,7 @@ def test_a_model_without_a_price_under_a_budget_is_an_error_at_the_start():
 async def test_a_budget_is_never_passed_and_stops_only_when_nothing_more_fits(limit, calls):
     budget = Budget(limit)
     own = budget.of("m")
-    refused: list[float] = []
+    refused = []
 
     async def call(most, share, steps):
         try:

@@ -39,7 +39,7 @@ class FakeTime:
         return Clock(lambda: self.now_s, self.sleep)
 
     async def sleep(self, seconds):
-        wake: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+        wake = asyncio.get_running_loop().create_future()
         heapq.heappush(self._sleepers, (self.now_s + seconds, next(self._numbers), wake))
         await wake
 
@@ -73,7 +73,7 @@ calls = st.lists(st.tuples(st.floats(0, 200), st.integers(1, 100), st.floats(0, 
 async def test_no_window_of_a_minute_has_more_starts_or_tokens_than_allowed(
     arrivals, rpm, tpm, width
 ):
-    starts: list[tuple[float, int]] = []
+    starts = []
     inside = 0
     time = FakeTime()
     limits = Limits(width, asyncio.Semaphore(width), rpm, tpm, clock=time.clock)
@@ -101,7 +101,7 @@ async def starts_of(tpm, *calls):
     """When calls start that were estimated at the first number of tokens and took the second."""
     time = FakeTime()
     limits = Limits(9, asyncio.Semaphore(9), tpm=tpm, clock=time.clock)
-    starts: list[float] = []
+    starts = []
 
     async def call(expected, taken):
         async with limits.slot(expected) as started:

@@ -6,11 +6,9 @@ import os
 import socket
 import subprocess
 import sys
-from collections.abc import Mapping
 from dataclasses import replace
 from datetime import date
 from pathlib import Path
-from typing import Any
 
 import pytest
 from aiohttp import web
@@ -73,7 +71,7 @@ class AnyPath(OpenAIChat):
 @pytest.fixture
 def sends(monkeypatch):
     """The addresses to which our client sends."""
-    found: list[str] = []
+    found = []
     send = HttpClient.send
 
     async def counted(self, url, *args, **fields):
@@ -87,7 +85,7 @@ def sends(monkeypatch):
 @pytest.fixture
 def hosts(monkeypatch):
     """The hosts that anything in the process looks up; none but this machine is found."""
-    found: set[str] = set()
+    found = set()
     look_up = socket.getaddrinfo
 
     def noted(host, *args, **fields):
@@ -116,7 +114,7 @@ def _environment(monkeypatch):
 
 
 def answer_of(model_id, **fields):
-    known: Mapping[str, Any] = {"seed": "never", "timeout_s": 10.0, "transport": "litellm"}
+    known = {"seed": "never", "timeout_s": 10.0, "transport": "litellm"}
     config = ModelConfig(name="m", id=model_id, **{**known, **fields})
     (answer,) = ask(make_model(config, policy=RetryPolicy(1, 0.0)), TEXT)
     return answer
@@ -154,9 +152,7 @@ def test_what_is_missing_on_this_machine_is_no_outage(monkeypatch, hosts):
 def settings_of(litellm):
     """Return what a program may have set: the module's values, its loggers and the environment."""
     kinds = (bool, int, float, str, type(None), tuple)
-    found: dict[str, object] = {
-        name: value for name, value in vars(litellm).items() if isinstance(value, kinds)
-    }
+    found = {name: value for name, value in vars(litellm).items() if isinstance(value, kinds)}
     found["callbacks"] = [
         list(getattr(litellm, name))
         for name in ("callbacks", "success_callback", "failure_callback", "_async_success_callback")
@@ -326,7 +322,7 @@ def test_each_is_asked_with_what_it_takes():
 
 def test_of_a_large_error_litellm_sees_the_beginning_alone(monkeypatch):
     """It looks for keys in all that it sees, again and again."""
-    sizes: list[int] = []
+    sizes = []
     after = LitellmClient._after
 
     def noted(self, error, *others):

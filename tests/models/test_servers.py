@@ -58,8 +58,8 @@ class Outage:
 
 def ask_through(client, time, *, samples, width, most_failures=20):
     """Ask as a run does, `width` samples at once, a stopped model no more."""
-    answers: list[Reply | ModelError] = []
-    told: list[str] = []
+    answers = []
+    told = []
 
     async def main():
         policy = RetryPolicy(clock=time.clock, max_connection_failures=most_failures)
@@ -158,7 +158,7 @@ def test_whoever_is_asked_is_there_and_has_no_more_to_do_than_any_other_that_is(
         break_off(servers, servers.all[number])
     there = [server for number, server in enumerate(servers.all) if number not in gone]
     assert servers.rest_s() == 0.0
-    held: list[Server] = []
+    held = []
     for begins, number in events:
         if begins:
             server = servers.pick()
@@ -233,7 +233,7 @@ def names(count):
 @pytest.mark.parametrize("route", ["direct", pytest.param("openai", marks=pytest.mark.slow)])
 def test_servers_that_die_in_the_middle_lose_nothing(route):
     servers = [OpenAIChat(Faults(latency_s=0.01), width=1) for _ in range(4)]
-    told: list[str] = []
+    told = []
 
     async def main():
         started = [await start(server, 0) for server in servers]
@@ -252,7 +252,7 @@ def test_servers_that_die_in_the_middle_lose_nothing(route):
     answers = asyncio.run(main())
     assert [type(answer) for answer in answers] == [Reply] * 120
     # No sample was sent again but those that were under way at a server that died.
-    asked: Counter[str] = sum((server.by_sample for server in servers), Counter())
+    asked = sum((server.by_sample for server in servers), Counter())
     assert len(asked) == 120
     # What one loses may come to the next before that dies.
     assert sum(asked.values()) - 120 <= 120
@@ -262,7 +262,7 @@ def test_servers_that_die_in_the_middle_lose_nothing(route):
 
 
 def test_a_server_that_refuses_everything_is_left_out_and_the_last_one_stops_the_model():
-    told: list[str] = []
+    told = []
     wrong, right = OpenAIChat(Faults(mode="404")), OpenAIChat()
     with Running(wrong) as first, Running(right) as second:
         config = at(first.url, second.url, max_concurrency=4)

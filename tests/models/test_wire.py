@@ -25,7 +25,7 @@ from phyblock.errors import (
 )
 from phyblock.models import client
 from phyblock.models.client import shown
-from phyblock.models.model import ModelEvent, RetryPolicy
+from phyblock.models.model import RetryPolicy
 from phyblock.models.request import Image, Message, json_body, wire_messages
 from phyblock.parsing.answer import choice_form
 from phyblock.parsing.move import move_form
@@ -61,7 +61,7 @@ class Wire:
     def ask(self, route, *requests, faults=None, policy=QUICK, **fields):
         """Ask a new model one request after another: its answers, the server, the events."""
         server, url = self.at(route, faults)
-        events: list[ModelEvent] = []
+        events = []
         config = ROUTES[route].config(url, **{"max_concurrency": 1, **fields})
         return ask(make_model(config, events=events, policy=policy), *requests), server, events
 
@@ -399,7 +399,7 @@ def answers_to(route, server, url, faults):
             return make_model(asked, policy=ONCE)
 
     async def all_of_them():
-        found: Answers = {}
+        found = {}
         model, hasty = new(20.0), new(0.7)
         for mode in faults:
             found[mode] = await one(hasty if mode == "drip" else model, mode)

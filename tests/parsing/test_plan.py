@@ -221,7 +221,7 @@ def test_numbering_candidates_otherwise_numbers_the_plan_otherwise(steps, order)
 
 
 def test_every_recorded_reply_is_read_as_counted(official_checkout):
-    found: dict[str, Counter[str]] = {}
+    found = {}
     for (model, _), text in reply_texts(official_checkout).items():
         parsed = parse_plan(text, 16)
         official = parse_plan(text, 16, "official").plan

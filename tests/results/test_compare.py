@@ -193,7 +193,7 @@ def varied(models):
     told = manifest(models=models, seeds=(0, 1), levels=(2,), settings=["A"], matchers=["optimal"])
     told["suite"]["vary"] = VARY
     rng = np.random.default_rng(3)
-    records: Records = []
+    records = []
     variants = VarySpec(**VARY).variants
     for model, n_items in models.items():
         skill = 1 + len(records) % 3

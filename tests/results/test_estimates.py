@@ -3,7 +3,6 @@
 import json
 import math
 from collections import defaultdict
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -49,9 +48,6 @@ def test_a_cut_last_line_is_passed_over_and_counted(tmp_path_factory, data):
     run = load_run(folder)
     assert run.records["model"].tolist() == ["alpha"]
     assert run.is_cut
-
-
-Records = list[dict[str, Any]]
 
 
 def of(run, measure, cell="overall", model="alpha", **way):
@@ -301,8 +297,8 @@ def test_ours_stands_beside_the_published_number_of_the_same_cell():
 
 
 def test_the_published_numbers_come_out_of_the_official_counts(official_dir):
-    scenes: dict[tuple[str, str], list[dict[str, Any]]] = defaultdict(list)
-    levels: dict[str, set[int]] = defaultdict(set)
+    scenes = defaultdict(list)
+    levels = defaultdict(set)
     for row in csv_rows(official_dir / "expected" / "assembly_counts.csv"):
         counts = (int(row[name]) for name in ("tp", "fp", "fn"))
         scenes[row["model"], row["scene"]].append(

@@ -5,7 +5,6 @@ import base64
 import csv
 import io
 import json
-from typing import Any
 
 import pandas as pd
 import pytest
@@ -39,7 +38,7 @@ def asked(model, seed, right, key="sh-1"):
 def folder(tmp_path):
     facts = manifest()
     facts["suite"]["tracks"] = ["full_planning", "vqa"]
-    records: list[dict[str, Any]] = []
+    records = []
     for place, scene in enumerate(LEVELS):
         for seed in (0, 1):
             scores = [score(place, 1, 1), score(place, 0, 1, setting="B")]

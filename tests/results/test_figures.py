@@ -51,7 +51,7 @@ def test_lines_over_levels_and_cost_show_the_headline(run):
 def test_shares_fill_a_bar(run):
     for table in ("errors", "losses"):
         drawn = shares(run, track=TRACK, table=table)
-        widths: dict[float, float] = {}
+        widths = {}
         for bar in drawn.axes[0].patches:
             place = round(bar.get_y(), 3)
             widths[place] = widths.get(place, 0) + bar.get_width()

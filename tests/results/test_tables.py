@@ -2,7 +2,6 @@
 
 import shutil
 import subprocess
-from typing import Any
 
 import pandas as pd
 import pytest
@@ -21,14 +20,12 @@ from phyblock.types import OUTCOMES
 from tests.results.test_estimates import complete, episode, episodes, questions
 from tests.web.factory import laws, manifest, record, record_lists, run_of, score, write_run
 
-Records = list[dict[str, Any]]
-
 
 def shown_numbers(run, track):
     """Hold every number of a track's tables against the estimates of its model; return how many."""
     frame = all_estimates(run)
     scales = {measure.name: measure.scale for measure in track_measures(track)}
-    known: dict[str, set[float]] = {}
+    known = {}
     for one in frame.to_dict("records"):
         ends = (scales[one["measure"]] * one[end] for end in ("value", "lo", "hi"))
         known.setdefault(one["model"], set()).update(round(float(end), 6) for end in ends)

@@ -123,7 +123,7 @@ def killed_at(workspace, server, number):
     """Kill a run at a moment of its server; True if it was reached."""
     reached = threading.Event()
     first = threading.Event()
-    pids: list[int] = []
+    pids = []
     count = iter(range(10**6))
 
     def moment(_, __):

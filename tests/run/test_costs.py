@@ -19,14 +19,7 @@ from phyblock.run.estimate import Estimate, estimate
 from phyblock.run.plan import make_plan
 from phyblock.run.runner import Session
 from tests.models.factory import ROUTES
-from tests.servers.billing import (
-    COMPLETION,
-    PROVIDERS,
-    Billing,
-    BillingOpenAI,
-    o200k_tokens,
-    tile_tokens,
-)
+from tests.servers.billing import COMPLETION, PROVIDERS, BillingOpenAI, o200k_tokens, tile_tokens
 from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat, said
 from tests.workspace import KEY_VARIABLE, in_a_loop, questions, write_questions
@@ -155,7 +148,7 @@ def planned(workspace):
 
 def begin(workspace, stack):
     """Write a suite and its models, each behind a server that bills as its provider does."""
-    servers: dict[str, Billing] = {}
+    servers = {}
     entries = {}
     for model_id, make in PROVIDERS.items():
         provider, _, name = model_id.partition("/")

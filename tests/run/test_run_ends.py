@@ -192,7 +192,7 @@ def nobody(_):
 @pytest.mark.parametrize("place", ["judge", "watch"])
 def test_a_mistake_of_ours_loses_no_call_under_way(workspace, monkeypatch, place):
     judge = FullPlanning.judge
-    judged: list[object] = []
+    judged = []
 
     def judges_badly(self, item, text):
         judged.append(item)
@@ -223,7 +223,7 @@ def test_a_mistake_of_ours_loses_no_call_under_way(workspace, monkeypatch, place
 def test_an_impatient_cancellation_keeps_all_that_was_answered(workspace, monkeypatch):
     begun, may_end = threading.Event(), threading.Event()
     append, put = AppendFile.append, AppendFile.put
-    answered: list[str] = []
+    answered = []
 
     async def notes(self, record):
         answered.append(record.sample)
@@ -321,7 +321,7 @@ def test_no_process_outlives_a_killed_run(workspace):
     (workspace.cache / "pictures").unlink()
     with prepare(workspace, OpenAIChat()):
         with workspace.start("--yes") as process:
-            family: list[psutil.Process] = []
+            family = []
             while not any("phyblock.workers" in " ".join(words_of(child)) for child in family):
                 assert process.poll() is None
                 family = psutil.Process(process.pid).children(recursive=True)

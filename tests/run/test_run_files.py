@@ -93,7 +93,7 @@ def test_a_disk_that_fails_at_any_call_leaves_what_was_written(tmp_path, monkeyp
 def test_a_run_is_on_disk_with_its_name_before_anything_is_asked(workspace, monkeypatch):
     workspace.write_suite(models=["oracle"])
     plan = make_plan(load_suite(workspace.root / "suite.yaml"), {})
-    synced: list[tuple[str, set[str]]] = []
+    synced = []
     fsync = os.fsync
 
     def notes(number):

@@ -287,7 +287,7 @@ def test_one_sample_goes_through_few_modules(inside):
     """
     workspace = inside
     workspace.write_suite(models=["alpha"], levels=[2, 3], settings=["A"])
-    entered: set[str] = set()
+    entered = set()
 
     def profile(frame, event, _):
         if event == "call" and len(server.seen) == 2:

@@ -286,9 +286,9 @@ def test_the_server_sees_goal_candidates_current_picture_and_history(workspace):
         assert {len(one.parts) for one in mine} == {4}
         goals = {one.pictures[:2] for one in mine}
         assert len(goals) == 1
-        operations: list[str] = []
-        world: list[int] = []
-        current: dict[tuple[int, ...], str] = {}
+        operations = []
+        world = []
+        current = {}
         for one, turn in zip(mine, record["turns"], strict=True):
             labels = [image["label"] for image in turn["prompt"]["images"]]
             assert labels == ["goal", "candidates", "current"]

@@ -1,7 +1,6 @@
 """Wrong steps and lost goal blocks: one type for each, and the right one."""
 
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import replace
 from itertools import permutations
 
@@ -14,7 +13,6 @@ from phyblock.domain.scene import Block, Candidate, CandidateSet, Plan, Scene
 from phyblock.scoring.plan import (
     BLOCK_OUTCOMES,
     ERROR_TYPES,
-    ErrorType,
     Goal,
     block_outcomes,
     count_errors,
@@ -39,7 +37,7 @@ def true_of(case, setting, index, placed):
     of_kind = [b for b in case.scene.blocks if b.kind == candidate.kind]
     free = [b for b in of_kind if b.order not in placed]
     free_equal = [b for b in free if equal(b, candidate, setting)]
-    holds: dict[ErrorType, bool] = {
+    holds = {
         "shape_not_in_gt": not of_kind,
         "overflow": bool(of_kind) and not free,
         "incorrect_orientation": bool(free) and not free_equal,
@@ -56,7 +54,7 @@ def true_of(case, setting, index, placed):
 def test_each_wrong_step_has_exactly_the_one_type_that_holds(setting, matcher, case):
     match = match_plan(Goal(case.scene, case.candidates, setting), case.plan, matcher)
     errors = errors_of(case, setting, matcher)
-    placed: set[int] = set()
+    placed = set()
     for index, vertex, error in zip(case.plan.steps, match.vertices, errors, strict=True):
         if vertex is None:
             assert error == true_of(case, setting, index, placed)
@@ -161,7 +159,7 @@ def test_missing_supports_have_the_cause_that_would_mend_them(setting, case):
     blocks = Counter(block.kind for block in case.scene.blocks)
     steps = Counter(case.candidates[index].kind for index in case.plan.steps)
     looks = Counter(block.look for block in case.scene.blocks)
-    exact: Counter[object] = Counter()
+    exact = Counter()
     for look, times in Counter(case.candidates[i].look for i in case.plan.steps).items():
         exact[look[:2]] += min(times, looks[look])
     named = Counter({kind: min(n, steps[kind]) for kind, n in blocks.items()})
@@ -198,7 +196,7 @@ def test_where_no_two_blocks_are_of_a_kind_each_has_the_outcome_that_its_own_sto
 
     goal = Goal(case.scene, case.candidates, "A")
     placed = set(match_plan(goal, case.plan, "optimal").vertices)
-    counted: Counter[str] = Counter()
+    counted = Counter()
     for vertex, block in enumerate(case.scene.blocks):
         under = [blocks[order] for order in below(block.order) - {block.order}]
         is_absent = any(other.kind not in kinds for other in under)
@@ -272,7 +270,7 @@ def test_steps_kept_are_those_common_with_the_nearest_of_all_valid_orders(settin
 def test_a_step_that_is_no_candidate_is_refused():
     scene = Scene("s", (3,), (Block(1, "arch", "red", FLAT, FLAT, (), 1),), ("s",))
     goal, plan = Goal(scene, CandidateSet((Candidate("arch", "red", FLAT),)), "A"), Plan((1, 2))
-    asked: list[Callable[[], object]] = [
+    asked = [
         lambda: block_outcomes(goal, plan, [0]),
         lambda: steps_kept(goal, plan),
         *(lambda matcher=matcher: match_plan(goal, plan, matcher) for matcher in MATCHERS),

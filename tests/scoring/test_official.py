@@ -17,8 +17,6 @@ from phyblock.types import MATCHERS, SETTINGS, PlanParser
 from tests.shipped import DATA, official_tasks, reply_texts
 from tests.workspace import csv_rows
 
-Row = tuple[str, str, str, str]
-
 
 @pytest.fixture(scope="module")
 def tasks(official_checkout):
@@ -131,7 +129,7 @@ def test_optimal_is_never_below_paper_on_recorded_replies(official_checkout, tas
         for setting in SETTINGS
     }
     replies = reply_texts(official_checkout)
-    plans: set[tuple[str, Plan]] = {
+    plans = {
         (scene, parse_plan(text, len(tasks[scene].candidates), parser).plan)
         for (_, scene), text in replies.items()
         if random.Random(text).random() < share

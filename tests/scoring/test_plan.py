@@ -47,7 +47,7 @@ def test_optimal_is_the_best_of_all_sequences_of_choices_and_paper_is_algorithm_
 @given(case=cases(max_blocks=8, max_steps=12))
 def test_every_step_places_a_ready_equal_block_or_could_not(setting, matcher, case):
     match = matched(case, setting, matcher)
-    placed: frozenset[int] = frozenset()
+    placed = frozenset()
     for index, vertex, mask in zip(case.plan.steps, match.vertices, match.placed, strict=True):
         orders = {case.scene.blocks[v].order for v in range(len(case.scene)) if mask & 1 << v}
         assert orders == placed

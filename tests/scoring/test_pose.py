@@ -227,7 +227,7 @@ def test_steps_are_matched_at_the_least_cost_of_all_valid_ways(n_blocks, n_steps
 
 
 def valid(graph, way):
-    done: set[int] = set()
+    done = set()
     for vertex in way:
         if vertex is not None:
             if vertex in done or not graph.depends_on[vertex] <= done:

@@ -10,7 +10,7 @@ from hypothesis.extra import numpy as hnp
 from scipy import stats
 from scipy.special import gammaincinv
 
-from phyblock.scoring.plan import Floats, f1_of, ratio_of
+from phyblock.scoring.plan import f1_of, ratio_of
 from phyblock.scoring.statistics import (
     POWER,
     Clusters,
@@ -245,7 +245,7 @@ def official(official_dir):
     """Counts of setting A by model, clusters by base scene, and every scene a cluster."""
     scenes = [task.scene for task in official_tasks(official_dir / "PhyBlock")]
     place = {scene.id: n for n, scene in enumerate(scenes)}
-    counts: dict[str, Floats] = defaultdict(lambda: np.zeros((len(scenes), 3)))
+    counts = defaultdict(lambda: np.zeros((len(scenes), 3)))
     for row in csv_rows(official_dir / "expected" / "assembly_counts.csv"):
         if (row["setting"], row["criterion"]) == ("A", "aov"):
             numbers = [int(row[name]) for name in ("tp", "fp", "fn")]

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from phyblock.domain.blocks import SHAPES, euler_deg_to_matrix
-from phyblock.domain.scene import Block
 from phyblock.errors import InputError
 from phyblock.scoring.pose import blocks_reached, overlap_volume, placed
 from phyblock.sim.contact import VOXEL_M, filled_voxels, voxel_iou
@@ -189,7 +188,7 @@ def test_who_is_knocked_over_is_named_and_stays_so(engine):
 
 
 def test_the_same_plan_ends_the_same_to_the_last_digit_whatever_came_before(engine):
-    beam: list[Block | None] = [*counterweighted_beam()[:3]]
+    beam = [*counterweighted_beam()[:3]]
     first = execute(beam, engine=engine)
     execute(tower(2), engine=engine)
     assert execute(beam, engine=engine) == first

@@ -13,7 +13,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from numpy.typing import NDArray
 from PIL import Image, ImageSequence
 
 from phyblock.domain.blocks import BLOCK_TYPES, KIT_PALETTE
@@ -170,7 +169,7 @@ def test_all_candidates_of_a_grid_have_one_scale_and_the_largest_fills_its_cell(
 
 
 def test_every_look_has_a_picture_of_its_own_that_fills_its_cell_above_the_number():
-    found: dict[object, NDArray[np.int64]] = {}
+    found = {}
     for candidate in EVERY_LOOK:
         one = on_the_floor(candidate.type, candidate.color, candidate.euler_deg)
         camera = candidate_camera(one, STYLE)

@@ -53,7 +53,7 @@ LATER = ("blocks", "kept")
 @pytest.fixture
 def add():
     """Adds measures to tracks; they are gone after the test."""
-    added: list[tuple[str, Measure]] = []
+    added = []
 
     def add(track, measure):
         registry.add_measure(track, measure)
@@ -223,7 +223,7 @@ def test_an_episode_that_would_have_asked_otherwise_is_no_longer_final(here, add
     lines = here.records()
     lines[0]["turns"][0]["reply"]["text"] = "Done"
     write_lines(here.out / "records.jsonl", lines)
-    told: list[str] = []
+    told = []
     rescore(here.out, report=told.append)
     first, *others = here.records()
     assert [text.partition(" this")[0] for text in told] == ["Step planning: in 1 episode"]

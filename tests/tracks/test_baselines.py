@@ -142,7 +142,7 @@ def scene(name, needed, parents=()):
 @st.composite
 def drawn_sets(draw):
     """Scenes of one to three blocks, some of them made from others, each with a set of the kit."""
-    scenes: list[Scene] = []
+    scenes = []
     sets = {}
     for number in range(draw(st.integers(2, 8))):
         offered = draw(st.permutations(KIT))[: draw(st.integers(3, 8))]

@@ -116,7 +116,7 @@ def test_a_reply_is_read_scored_and_carried_out(task, text, right, ends, errors,
 
 def worlds_of(put, steps):
     """Return the blocks after each step, as the report shows them."""
-    lying: dict[int, Block] = {}
+    lying = {}
     worlds = []
     for number, (block, step) in enumerate(zip(put, steps, strict=True), 1):
         if block is not None and step.end not in REFUSED_ENDS:

@@ -21,7 +21,6 @@ from phyblock.tracks.questions import (
     CHOICE_RULES,
     AskedQuestion,
     ChoiceSubject,
-    Vqa,
     question_drawings,
     select_questions,
 )
@@ -42,8 +41,7 @@ def opened(found, shop, size_px=128, **vqa):
     """The track on a set of questions that is in no file."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(questions, "open_questions", lambda *_: found)
-        track: Vqa = track_of("vqa", shop=shop, images={"size_px": size_px}, vqa=vqa)
-    return track
+        return track_of("vqa", shop=shop, images={"size_px": size_px}, vqa=vqa)
 
 
 def of_tasks(found, tasks):
@@ -63,12 +61,6 @@ def user_parts(request):
 
 def images(request):
     return [part for part in user_parts(request) if isinstance(part, Image)]
-
-
-def text_of(request):
-    last = user_parts(request)[-1]
-    assert isinstance(last, str)
-    return last
 
 
 def test_the_answer_stands_in_no_message(question_set, shop):

@@ -5,7 +5,6 @@ import functools
 import json
 import re
 import zlib
-from collections.abc import Callable
 from typing import get_args
 
 import numpy as np
@@ -14,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from phyblock.domain.scene import AssemblyTask, Block, Candidate, CandidateSet, Scene
-from phyblock.models.request import Image, Request
+from phyblock.models.request import Image
 from phyblock.parsing.move import MOVE_PROBLEMS
 from phyblock.records.record import Reply
 from phyblock.run.estimate import has_all_pictures
@@ -27,8 +26,6 @@ from tests.shipped import TASKS, official_tasks
 from tests.tracks.conftest import seesaw, track_of
 
 OPEN = {"max_failures": None, "max_repeats": None}
-
-Agent = Callable[[Request], Reply | str]
 
 
 def made(form="text", shop=None, **steps):

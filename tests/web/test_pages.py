@@ -1,11 +1,8 @@
 """Report and site in a real browser, opened from disk: views, addresses, keys, hostile texts."""
 
-from __future__ import annotations
-
 import re
 import shutil
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 import yaml
@@ -13,13 +10,9 @@ import yaml
 from phyblock.results.tables import write_tables
 from phyblock.scoring.plan import ERROR_TYPES
 from phyblock.web.report import write_report
-from tests.web.conftest import HOSTILE, NAME, PageVisit, expect
+from tests.web.conftest import HOSTILE, NAME, expect
 from tests.web.factory import manifest, write_run
 
-if TYPE_CHECKING:
-    pass
-
-Visiting = Callable[..., PageVisit]
 PHONE = {"width": 390, "height": 844}
 WIDE = "document.documentElement.scrollWidth <= innerWidth"
 

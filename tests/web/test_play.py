@@ -113,7 +113,7 @@ def played(suite, picks):
     person = Person("ada")
     plan = plan_session(load_suite(suite), person, None)
     session = PlaySession(plan.samples_per_model)
-    shown: list[str] = []
+    shown = []
 
     async def sat():
         left = list(picks)
@@ -190,7 +190,7 @@ class Answer(NamedTuple):
 
 def ask(server, method="GET", path="/{token}/state", body=None, **headers):
     """A request as a page of the server makes it, but for what is given; None leaves out."""
-    usual: dict[str, str | None] = {"Host": server.hosts[0]}
+    usual = {"Host": server.hosts[0]}
     if method == "POST":
         usual["Origin"] = f"http://{server.hosts[0]}"
         usual["Content-Type"] = "application/json"

@@ -3,23 +3,17 @@
 What is answered here is a script's, to test the page: it says nothing of what people can do.
 """
 
-from __future__ import annotations
-
 import re
 import time
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from types import SimpleNamespace
 
 import pytest
 
-from tests.fork_server import Forked, fork_server
+from tests.fork_server import fork_server
 from tests.web.conftest import Visit
 from tests.workspace import SCENES, questions, read_lines, write_questions
-
-if TYPE_CHECKING:
-    from playwright.sync_api import Page
 
 SUBTASKS = ("SH", "OR", "AD", "VP")
 PHONE = {"width": 390, "height": 780}
@@ -52,15 +46,6 @@ def workspace(new_workspace):
     return made
 
 
-@dataclass
-class Sat:
-    """A page at a running server."""
-
-    page: Page
-    process: Forked
-    visit: Visit
-
-
 @contextmanager
 def sitting(browser, workspace, **options):
     """A page at the address that a browser is started with; it asks for nothing elsewhere."""
@@ -75,7 +60,7 @@ def sitting(browser, workspace, **options):
             assert printed[2] not in address
             visit = opened(browser, address, **options)
             assert visit.page.url == printed[0]
-            yield Sat(visit.page, process, visit)
+            yield SimpleNamespace(page=visit.page, process=process, visit=visit)
             assert visit.asked_elsewhere(address, printed[0]) == []
             visit.page.close()
         finally:
