@@ -65,6 +65,11 @@ def invoked(*words: object, **env: str) -> Result:
     )
 
 
+def plan_text(*numbers: int) -> str:
+    """A plan in the form that is asked for."""
+    return "\n".join(f"Step{i}: Move block with index {n}" for i, n in enumerate(numbers, 1))
+
+
 def write_lines(path: Path, rows: Iterable[object]) -> Path:
     """Write a row of JSON a line."""
     path.write_text("".join(json.dumps(row) + "\n" for row in rows), encoding="utf-8")

@@ -304,14 +304,12 @@ def test_a_release_date_changes_nothing(name, day, form):
 def test_case_and_separators_change_nothing(name, data):
     bare = name.rpartition("/")[2]
     other = "".join(
-        data.draw(st.sampled_from("-_. ")) if char in "-_. " else data.draw(_cases(char))
+        data.draw(st.sampled_from("-_. "))
+        if char in "-_. "
+        else data.draw(st.sampled_from([char.lower(), char.upper()]))
         for char in bare
     )
     assert match_published(other) == match_published(name)
-
-
-def _cases(char):
-    return st.sampled_from([char.lower(), char.upper()])
 
 
 @given(names, st.from_regex(r"[a-z]{2,9}", fullmatch=True))

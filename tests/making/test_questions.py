@@ -48,11 +48,6 @@ def made(names, wanted, seed=0, jobs=1):
         return make_questions([SCENES[name] for name in names], wanted, seed, workers)
 
 
-def dynamic(jobs=1):
-    asked = ((made(list(names), {s: n}, jobs=jobs)) for s, (n, names) in ASKED.items())
-    return [question for some in asked for question in some]
-
-
 def lines_of(questions):
     return [StoredQuestion.of(q, SCENES[q.scene.id]).as_json() for q in questions]
 
@@ -70,7 +65,8 @@ def static():
 
 @pytest.fixture(scope="module")
 def pictured():
-    return dynamic()
+    asked = (made(list(names), {s: n}) for s, (n, names) in ASKED.items())
+    return [question for some in asked for question in some]
 
 
 def test_every_answer_is_derived_again_and_every_other_is_found_out(static, pictured):

@@ -13,15 +13,11 @@ from hypothesis import strategies as st
 from phyblock.parsing.plan import parse_plan
 from tests.shipped import reply_texts
 from tests.workspace import csv_rows
+from tests.workspace import plan_text as asked
 
 N = 16
 COUNTS = Path(__file__).with_name("recordings.csv")
 """Readings of the official recordings, by model."""
-
-
-def asked(*numbers):
-    """Return a plan in the asked form."""
-    return "\n".join(f"Step{i}: Move block with index {n}" for i, n in enumerate(numbers, 1))
 
 
 PLAN = (7, 7, 12, 3, 5, 9, 14, 2, 1)

@@ -103,15 +103,11 @@ def question_set(tmp_path_factory, towers):
     return read_questions(write_questions(tmp_path_factory.mktemp("vqa") / "q"), towers)
 
 
-def rows_of(path):
-    csv.field_size_limit(10**8)
-    return csv_rows(path, delimiter="\t")
-
-
 def test_tsv_files_are_as_vlmevalkit_reads_them(question_set, towers, tmp_path):
     out, asked_of = tmp_path / "out", str(question_set.root)
     files = write_vlmevalkit(out, asked_of, str(towers.root), None, 128)
-    choice, ordering = (rows_of(file) for file in files)
+    csv.field_size_limit(10**8)
+    choice, ordering = (csv_rows(file, delimiter="\t") for file in files)
     asked = {task.key: task.question for task in question_set.tasks}
     assert {row["index"] for row in (*choice, *ordering)} == set(asked)
     assert len(choice) + len(ordering) == len(asked)

@@ -9,6 +9,7 @@ from phyblock.sim.pictures import PictureStyle, candidates_png, goal_png
 from phyblock.tracks.base import presented, shown_order
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
+from tests.workspace import plan_text
 
 STYLE = PictureStyle(size_px=128)
 SEEDS = (0, 1)
@@ -26,7 +27,7 @@ def digest(png):
 
 def plan_of(task):
     numbers = [task.candidates.index_of(block.look) for block in task.scene.blocks]
-    return "\n".join(f"Step{i}: Move block with index {n}" for i, n in enumerate(numbers, 1))
+    return plan_text(*numbers)
 
 
 def tasks_of(workspace):
@@ -172,8 +173,7 @@ BRIEF = "{% block user %}Build it. End with lines: Step1: Move block with index 
 def moody(seen):
     """Answer by the seed as well, as a model that draws."""
     draw = hashlib.sha256(seen.sample.encode()).digest()
-    steps = enumerate(draw[:3], 1)
-    return "\n".join(f"Step{n}: Move block with index {byte % 5 + 1}" for n, byte in steps)
+    return plan_text(*(byte % 5 + 1 for byte in draw[:3]))
 
 
 def prepare(workspace, url, **fields):

@@ -230,7 +230,7 @@ def test_circular_and_blind_a_question_counts_once_and_only_if_all_rotations_are
     assert all(
         record["answer"]["correct"] == is_cube[record["question"]["id"]] for record in records
     )
-    cells = accuracies(workspace, "accuracy")
+    cells = {r["cell"]: r for r in workspace.rows("estimates") if r["measure"] == "accuracy"}
     for subtask in ("SH", "CO"):
         right = [held for name, held in is_cube.items() if name.startswith(subtask.lower())]
         assert float(cells[subtask]["value"]) == pytest.approx(sum(right) / 3, abs=1e-6)
@@ -239,11 +239,6 @@ def test_circular_and_blind_a_question_counts_once_and_only_if_all_rotations_are
     assert "[circular, blind]" in workspace.tables()["table2.tex"].decode().replace(
         "{", ""
     ).replace("}", "")
-
-
-def accuracies(workspace, measure):
-    rows = workspace.rows("estimates")
-    return {row["cell"]: row for row in rows if row["measure"] == measure}
 
 
 AT_ONCE = 4

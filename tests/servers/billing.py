@@ -52,11 +52,6 @@ def claude_tokens(width: int, height: int) -> int:
     return -(-width // 28) * -(-height // 28)
 
 
-def gemini_tokens(_width: int, _height: int) -> int:
-    """A picture that is shown to Gemini 3 as it is by default."""
-    return 1120
-
-
 @functools.cache
 def _o200k() -> tiktoken.Encoding:
     with pytest.MonkeyPatch.context() as patch:
@@ -158,6 +153,6 @@ PROVIDERS: dict[str, Callable[[], Billing]] = {
     "anthropic/claude-opus-5-5": lambda: BillingAnthropic(
         lambda text: len(_claude().encode(text).ids), claude_tokens
     ),
-    "gemini/gemini-3.8-flash": lambda: BillingGemini(lambda text: len(text) / 4, gemini_tokens),
+    "gemini/gemini-3.8-flash": lambda: BillingGemini(lambda text: len(text) / 4, lambda *_: 1120),
 }
 """By model, a server that bills as its provider does."""

@@ -22,6 +22,7 @@ from typing import Any
 from aiohttp import web
 
 from tests.servers.faults import WIRE_FAULTS, reset_connection
+from tests.workspace import plan_text
 
 FAULTS = ("429", "500", "reset", "cut", "html", "empty")
 ELSEWHERE = "http://localhost:9"
@@ -103,10 +104,7 @@ class Seen:
     def reply_text(self) -> str:
         """Four steps that depend on the messages alone."""
         digest = hashlib.sha256(json.dumps([self.system, self.parts]).encode()).digest()
-        return "\n".join(
-            f"Step{i}: Move block with index {byte % 16 + 1}"
-            for i, byte in enumerate(digest[:4], 1)
-        )
+        return plan_text(*(byte % 16 + 1 for byte in digest[:4]))
 
 
 class LocalServer(ABC):

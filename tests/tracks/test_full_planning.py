@@ -14,6 +14,7 @@ from phyblock.tracks.base import presented
 from phyblock.tracks.full_planning import pose_choices, pose_counts
 from phyblock.tracks.goal_blind import goal_blind_plans
 from tests.tracks.conftest import track_of
+from tests.workspace import plan_text
 
 
 @pytest.fixture(scope="module")
@@ -21,17 +22,13 @@ def track(tasks):
     return track_of("full_planning", tasks, scoring={"level1": "selection"})
 
 
-def steps(*numbers):
-    return "\n".join(f"Step{i}: Move block with index {n}" for i, n in enumerate(numbers, 1))
-
-
 @pytest.mark.parametrize(
     ("text", "counts"),
     [
-        (steps(1, 3), (2, 0, 0)),
-        (steps(3, 1), (1, 1, 1)),
-        (steps(1), (1, 0, 1)),
-        (steps(1, 3, 3), (2, 1, 0)),
+        (plan_text(1, 3), (2, 0, 0)),
+        (plan_text(3, 1), (1, 1, 1)),
+        (plan_text(1), (1, 0, 1)),
+        (plan_text(1, 3, 3), (2, 1, 0)),
         ("I cannot say.", (0, 0, 2)),
         (None, (0, 0, 2)),
     ],
@@ -47,7 +44,9 @@ def test_a_reply_is_scored_under_every_setting_and_matcher(track, text, counts):
     assert level1 == [("selection", "A"), ("selection", "B")]
 
 
-@given(st.text(max_size=300) | st.lists(st.integers(-2, 20), max_size=8).map(lambda n: steps(*n)))
+@given(
+    st.text(max_size=300) | st.lists(st.integers(-2, 20), max_size=8).map(lambda n: plan_text(*n))
+)
 def test_any_reply_is_judged_and_every_goal_block_accounted_for(track, text):
     task = track.items[0]
     fields = track.judge(task, text).fields
@@ -71,7 +70,8 @@ def test_learned_plans_are_those_of_the_order_shown(tasks):
 
 
 @pytest.mark.parametrize(
-    ("name", "text"), [("full_planning", steps(1, 3, 2, 4)), ("vqa", "I see\na cube.\n\nAnswer: B")]
+    ("name", "text"),
+    [("full_planning", plan_text(1, 3, 2, 4)), ("vqa", "I see\na cube.\n\nAnswer: B")],
 )
 def test_a_reply_is_judged_in_ten_modules(name, text):
     track, entered = track_of(name, limit=1), set[str]()

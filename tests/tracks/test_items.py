@@ -16,7 +16,7 @@ from phyblock.tracks.base import file_plan, in_order, presented, shown_order, sp
 from phyblock.tracks.difficulty import MEASURES, distractor_distance, log_orders
 from tests.shipped import TASKS
 from tests.tracks.conftest import track_of
-from tests.workspace import call
+from tests.workspace import call, plan_text
 
 SIZES = st.lists(st.integers(1, 200), min_size=1, max_size=4)
 seeds = st.integers(0, 2**31 - 1)
@@ -70,14 +70,11 @@ def test_orders_stay_as_they_were_drawn(tasks):
 
 @given(st.integers(0, 4), seeds, plans)
 def test_a_plan_is_worth_the_same_in_either_numbering(tasks, place, seed, plan):
-    def text(steps):
-        return "\n".join(f"Step{i}: Move block with index {n}" for i, n in enumerate(steps, 1))
-
     task, track = tasks[place], _track("full_planning")
     shown = presented(task, seed, "shuffled")
-    here = track.judge(shown, text(plan)).fields
+    here = track.judge(shown, plan_text(*plan)).fields
     in_file = here["parse"]["file_plan"]
-    again = track.judge(task, text(in_file)).fields
+    again = track.judge(task, plan_text(*in_file)).fields
     assert here["scores"] == again["scores"]
     assert again["parse"]["file_plan"] is None
     named = [shown.candidates[n] for n in here["parse"]["plan"]]

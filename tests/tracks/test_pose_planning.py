@@ -29,7 +29,7 @@ from phyblock.types import REFUSED_ENDS, STEP_ENDS
 from tests.shipped import TASKS
 from tests.sim.structures import block_types, eulers
 from tests.tracks.conftest import track_of
-from tests.workspace import call
+from tests.workspace import call, plan_text
 
 STANDS = "Step1: block 1 at (0, 0, 2.5)\nStep2: block 3 at (0, 0, 7.5)"
 
@@ -153,9 +153,8 @@ def test_where_blocks_came_to_lie_follows_from_what_each_step_moved(built_in, ba
 def test_without_poses_a_plan_is_scored_as_full_planning_scores_it(task, numbers):
     """Far from one another, so that nothing falls on anything."""
     steps = [PoseStep(n, (20.0 * place, 0.0, 2.5)) for place, n in enumerate(numbers)]
-    plain = "\n".join(f"Step{i}: Move block with index {n}" for i, n in enumerate(numbers, 1))
     full = track_of("full_planning", TASKS[:1])
-    found = full.judge(task, plain if numbers else None).fields["scores"]
+    found = full.judge(task, plan_text(*numbers) if numbers else None).fields["scores"]
     wanted = [score for score in found if score["criterion"] == "aov"]
     assert poses().judge(task, written(steps)).fields["scores"] == wanted
 

@@ -13,7 +13,7 @@ import pytest
 
 from tests.fork_server import fork_server
 from tests.web.conftest import Visit
-from tests.workspace import SCENES, questions, read_lines, write_questions
+from tests.workspace import SCENES, plan_text, questions, read_lines, write_questions
 
 SUBTASKS = ("SH", "OR", "AD", "VP")
 PHONE = {"width": 390, "height": 780}
@@ -100,10 +100,6 @@ def said(record):
     return record["reply"]["text"]
 
 
-def plan(*numbers):
-    return "\n".join(f"Step{n}: Move block with index {one}" for n, one in enumerate(numbers, 1))
-
-
 def poses(*steps):
     return "\n".join(f"Step{n}: block {one}" for n, one in enumerate(steps, 1))
 
@@ -120,7 +116,7 @@ def test_a_sitting_by_mouse_keys_and_phone_over_a_kill(browser, workspace):
         assert not sat.visit.complaints
         sat.process.kill()
         sat.page.get_by_text("has stopped").wait_for()
-    assert [*map(said, answered(run))] == [plan(3, 7), plan(12, 1, 7)]
+    assert [*map(said, answered(run))] == [plan_text(3, 7), plan_text(12, 1, 7)]
     with sitting(browser, workspace, viewport=PHONE, has_touch=True, color_scheme="dark") as sat:
         end_on_a_phone(sat.page, run)
         assert sat.process.wait() == 0
@@ -146,7 +142,7 @@ def begin_with_mouse_and_keys(page, run):
     page.get_by_role("button", name="Submit 2 steps").click()
     task(page, 2)
     (first,) = answered(run)
-    assert (said(first), first["model"], first["seed"]) == (plan(3, 7), "human:ada", 3)
+    assert (said(first), first["model"], first["seed"]) == (plan_text(3, 7), "human:ada", 3)
     assert 0 < first["reply"]["latency_s"] < 60
     assert shown == stored_prompt(run, first)
 
@@ -154,7 +150,7 @@ def begin_with_mouse_and_keys(page, run):
     for key in ("1", "2", "1", "Enter", "9", "Backspace", "7", "Control+Enter"):
         page.keyboard.press(key)
     task(page, 3)
-    assert said(answered(run)[1]) == plan(12, 1, 7)
+    assert said(answered(run)[1]) == plan_text(12, 1, 7)
 
 
 def end_on_a_phone(page, run):
