@@ -125,20 +125,16 @@ def test_json_beyond_the_bounds_is_a_value_error(text, message):
         load_json(text)
 
 
-def test_a_file_is_read_up_to_the_limit(tmp_path):
-    path = tmp_path / "file"
+def test_only_files_are_read_and_up_to_the_limit(tmp_path):
+    path, pipe = tmp_path / "file", tmp_path / "pipe"
     path.write_bytes(b"x" * 100)
     assert read_bytes(path, 100) == b"x" * 100
     with pytest.raises(ValueError, match="larger than"):
         read_bytes(path, 99)
-
-
-def test_pipes_and_devices_are_refused_at_once(tmp_path):
-    pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
-    for path in (pipe, Path("/dev/zero")):
+    for device in (pipe, Path("/dev/zero")):
         with pytest.raises(ValueError, match="regular file"):
-            read_bytes(path)
+            read_bytes(device)
     with pytest.raises(IsADirectoryError):
         read_bytes(tmp_path)
 

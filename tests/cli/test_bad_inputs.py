@@ -8,6 +8,7 @@ import sqlite3
 from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass
+from functools import partial
 
 import pytest
 import yaml
@@ -71,14 +72,15 @@ def suite_line(line):
     return suite_text("\n".join([*kept, line, ""]))
 
 
-def options(*more):
-    """A sound suite, and these options."""
-    return lambda _: [*RUN, *more]
-
-
 def command(*args):
     """Another command."""
     return lambda _: list(args)
+
+
+options = partial(command, *RUN)
+"""A sound suite, and these options."""
+file_in_the_way = partial(file, "taken", "mine")
+"""A file stands where the command line names a folder."""
 
 
 def scenes_text(change):
@@ -151,11 +153,8 @@ def checkout(picture):
             folder = root / "data" / "SCENEs_400_Goal_and_Cand_Imgs_resized"
             folder.mkdir()
             (folder / "000.png").write_bytes(picture)
-        workspace.write_suite(
-            dataset={"format": "official", "path": "official"},
-            images={"source": "dataset"},
-            models=["alpha"],
-        )
+        official = {"format": "official", "path": "official"}
+        workspace.write_suite(dataset=official, images={"source": "dataset"}, models=["alpha"])
         return FRESH
 
     return prepare
@@ -203,11 +202,6 @@ def manifest_without(field, *args):
         workspace.write_yaml("out/run.yaml", manifest)
 
     return after(change, *args)
-
-
-def file_in_the_way(*args):
-    """A file `taken` stands where the command line names a folder."""
-    return file("taken", "mine", *args)
 
 
 def foreign_cache(workspace):

@@ -45,14 +45,11 @@ def change(path, field, value):
     path.write_text(json.dumps(changed), encoding="utf-8")
 
 
-def test_both_formats_say_the_same(tmp_path):
+def test_both_formats_say_the_same_and_what_only_official_files_have_is_read(tmp_path):
     official = read_official(write_checkout(tmp_path, SCENE))
     assert official.tasks == read_builtin(write_scenes(tmp_path, SCENE)).tasks
     assert official.name == "official"
-
-
-def test_what_only_official_files_have_is_read(tmp_path):
-    (task,) = read_official(write_checkout(tmp_path, SCENE)).tasks
+    (task,) = official.tasks
     assert (task.scene.look_at_m, task.composite, task.scene.parents) == (None, None, ("s1",))
     # A level-2 scene counts in level 1 too; declared layers are taken as they are.
     for field, value in (
@@ -93,7 +90,10 @@ def test_what_is_broken_is_named_with_file_and_field(
     assert message in problem.message
 
 
-def test_what_is_wrong_in_every_scene_is_said_at_once(tmp_path):
+def test_what_is_wrong_in_every_scene_is_said_at_once_and_no_scenes_are_no_checkout(tmp_path):
+    (problem,) = problems_of(tmp_path)
+    assert problem.where == str(tmp_path)
+    assert "checkout" in problem.allowed
     write_checkout(tmp_path, SCENE, {**SCENE, "id": "s2"}, {**SCENE, "id": "s3"})
     goals = goal_path(tmp_path).parent
     candidates_path(tmp_path).unlink()
@@ -104,12 +104,6 @@ def test_what_is_wrong_in_every_scene_is_said_at_once(tmp_path):
     assert "No such file" in missing.message
     assert syntax.where.endswith("s2.json:2:3")
     assert "not a name" in name.message
-
-
-def test_a_folder_without_scenes_is_no_checkout(tmp_path):
-    (problem,) = problems_of(tmp_path)
-    assert problem.where == str(tmp_path)
-    assert "checkout" in problem.allowed
 
 
 def record(root, model, scene, raw):

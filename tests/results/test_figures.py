@@ -35,7 +35,7 @@ def run():
     return run_of(records(), manifest(models=MODELS, seeds=[0]))
 
 
-def test_lines_over_levels_and_cost_show_the_headline(run):
+def test_lines_show_the_headline_shares_fill_a_bar_and_a_forest_has_a_row_a_pair(run):
     values = Headline(run, TRACK).values
     drawn = levels(run, track=TRACK)
     for line in drawn.axes[0].lines:
@@ -46,9 +46,6 @@ def test_lines_over_levels_and_cost_show_the_headline(run):
     assert points == pytest.approx(
         {n + 1.0: values[model, "Overall F1"].value for n, model in enumerate(MODELS)}
     )
-
-
-def test_shares_fill_a_bar(run):
     for table in ("errors", "losses"):
         drawn = shares(run, track=TRACK, table=table)
         widths = {}
@@ -56,6 +53,11 @@ def test_shares_fill_a_bar(run):
             place = round(bar.get_y(), 3)
             widths[place] = widths.get(place, 0) + bar.get_width()
         assert all(width == pytest.approx(100) for width in widths.values())
+    # Of two models a row a part.
+    for chosen, rows in ((run, 3), (of_models(run, MODELS[:2]), 5)):
+        drawn = forest(chosen, track=TRACK)
+        assert len(drawn.axes[0].get_yticks()) == rows
+    assert forest(of_models(run, MODELS[:1]), track=TRACK) is None
 
 
 def test_a_run_without_an_answer_draws_nothing_and_does_not_fail(tmp_path):
@@ -64,13 +66,6 @@ def test_a_run_without_an_answer_draws_nothing_and_does_not_fail(tmp_path):
     ]
     write_run(tmp_path, failed, manifest(models=MODELS, seeds=[0]))
     assert write_paper_figures(load_run(tmp_path), (), Look()) == ()
-
-
-def test_a_forest_has_a_row_a_pair_or_of_two_models_a_row_a_part(run):
-    for chosen, rows in ((run, 3), (of_models(run, MODELS[:2]), 5)):
-        drawn = forest(chosen, track=TRACK)
-        assert len(drawn.axes[0].get_yticks()) == rows
-    assert forest(of_models(run, MODELS[:1]), track=TRACK) is None
 
 
 def test_files_are_the_same_each_time_in_three_formats_with_captions(tmp_path):

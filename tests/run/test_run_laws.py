@@ -75,7 +75,7 @@ def test_tables_follow_from_the_records_byte_for_byte(copy):
     assert copy.tables() == tables
 
 
-def test_replies_from_the_cache_are_worth_the_same(copy):
+def test_cached_replies_are_worth_the_same_and_other_rules_score_them_without_a_call(copy):
     # The server is gone: whatever is answered comes from the cache.
     first = scores(copy.records())
     copy.out = copy.root / "cached"
@@ -87,16 +87,12 @@ def test_replies_from_the_cache_are_worth_the_same(copy):
     assert {name: copy.tables()[name] for name in SCORED} == {
         name: copy.tables(copy.root / "out")[name] for name in SCORED
     }
-
-
-def test_other_rules_score_the_same_replies_without_a_call(copy):
-    first = [record.get("reply", {}).get("text") for record in copy.records()]
+    texts = [record.get("reply", {}).get("text") for record in copy.records()]
     copy.out = copy.root / "official"
-    rules = ("--set", "parser=official", "--set", "scoring.matchers=[paper]")
-    copy.completed(*rules)
+    copy.completed("--set", "parser=official", "--set", "scoring.matchers=[paper]")
     records = copy.records()
     assert {record["parse"]["parser"] for record in records} == {"official"}
-    assert sorted(map(str, first)) == sorted(str(r.get("reply", {}).get("text")) for r in records)
+    assert sorted(map(str, texts)) == sorted(str(r.get("reply", {}).get("text")) for r in records)
     assert all(r["reply"]["cached"] for r in records if r["model"] == "alpha")
     assert "matcher paper" in copy.tables()["table1.md"].decode()
 

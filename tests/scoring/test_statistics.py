@@ -253,7 +253,8 @@ def official(official_dir):
     return counts, Clusters.of([s.parents for s in scenes]), alone(len(scenes))
 
 
-def test_recorded_scenes_of_common_origin_widen_the_naive_standard_error(official):
+def test_recorded_models_have_the_dyadic_standard_error_alone_and_in_pairs(official):
+    """Scenes of common origin widen the naive one."""
     counts, clusters, naive = official
     gpt_4o = counts["gpt-4o"]
     assert clusters.size == 150
@@ -261,10 +262,6 @@ def test_recorded_scenes_of_common_origin_widen_the_naive_standard_error(officia
     found = float(jackknife(gpt_4o, clusters, f1_of).se)
     assert 100 * found == pytest.approx(2.2, abs=0.1)
     assert found == pytest.approx(dyadic_se(influence(gpt_4o), clusters), rel=0.03)
-
-
-def test_recorded_models_are_compared_in_pairs(official):
-    counts, clusters, _ = official
     pair = np.stack([counts["gpt-4o"], counts["gemini-2.0-flash"]], axis=1)
     found = jackknife(pair, clusters, difference_of)
     assert 100 * found.value == pytest.approx(-0.5, abs=0.1)
