@@ -178,7 +178,7 @@ def _no_models(records, manifest):
     records.clear()
 
 
-FORGED: dict[str, tuple[Change, str]] = {
+FORGED = {
     "score": (_score, "does not verify"),
     "answer": (_answer, RECORDS),
     "turn": (_turn, RECORDS),
@@ -251,7 +251,7 @@ def encrypted():
     return bytes(data)
 
 
-HOSTILE: dict[str, Callable[[], bytes]] = {
+HOSTILE = {
     "empty": lambda: b"",
     "text": lambda: b"hello\n" * 100,
     "out of the folder": lambda: archive(*SOUND.items(), ("../../evil", b"x")),

@@ -252,7 +252,7 @@ class Bad:
     bytes_left: int | None = None
 
 
-SUITES: tuple[Bad, ...] = (
+SUITES = (
     Bad("key", suite_line("sede: [1]"), ("suite.yaml:4:1: sede", "did you mean seeds?", "allowed")),
     Bad("inner-key", suite_line("limits: {max_cost: 1}"), ("suite.yaml:4:10: limits.max_cost",)),
     Bad("type", suite_line("seeds: five"), ("suite.yaml:4:8: seeds", 'found: "five"', "list")),
@@ -278,7 +278,7 @@ SUITES: tuple[Bad, ...] = (
     Bad("absent", command("run", "quik"), ("quik: ", "allowed: ", "did you mean quick?")),
     Bad("folder", command("run", "data"), ("data: there is no such suite file",)),
 )
-OPTIONS: tuple[Bad, ...] = (
+OPTIONS = (
     Bad("set-key", options("--set", "limits.max=1"), ("--set limits.max=1: limits.max", "allowed")),
     Bad("set-value", options("--set", "seeds=x"), ("--set seeds=x: seeds", 'found: "x"')),
     Bad("set-form", options("--set", "seeds"), ("--set seeds", "key=value")),
@@ -325,7 +325,7 @@ OPTIONS: tuple[Bad, ...] = (
     Bad("set-deep", options("--set", "a." * 9_000 + "a=1"), ("key=value",)),
     Bad("init", command("init", "."), ("models.yaml", "is already there")),
 )
-DATA: tuple[Bad, ...] = (
+DATA = (
     Bad("cycle", second_scene("blocks.0.depend", [2]), ("scenes.jsonl:2: ", "cycle", "1 -> 2")),
     Bad("dangling", second_scene("blocks.1.depend", [7]), ("scenes.jsonl:2: ", "found: 7")),
     Bad("nan-m", second_scene("blocks.1.position", [0, 0, float("nan")]), ("jsonl:2:", "NaN")),
@@ -346,7 +346,7 @@ DATA: tuple[Bad, ...] = (
     Bad("huge-png", checkout(png_header(30_000, 30_000)), ("000.png", "900000000 pixels")),
     Bad("cut-png", checkout(png()[:-40]), ("000.png", "is not a readable picture")),
 )  # fmt: skip
-MODELS: tuple[Bad, ...] = (
+MODELS = (
     Bad("no-rule", options("--models", "repeat"), ("repeat", "has no rule for full_planning")),
     Bad("engine", command(*FRESH, "--models", "random", "--set", "tracks=[step_planning]"),
         ("PHYBLOCK_PHYSICS: is not known", "found: bullet", "allowed: "),
@@ -400,7 +400,7 @@ MODELS: tuple[Bad, ...] = (
     Bad("strange-reply", recording('{"speech": 1}'), ("t1.json", "speech"), writes=("fresh",)),
     Bad("no-json", recording('{"text": '), ("t1.json:1:10", "is not JSON"), writes=("fresh",)),
 )  # fmt: skip
-FOLDERS: tuple[Bad, ...] = (
+FOLDERS = (
     Bad("below-file", file_in_the_way("run", "suite.yaml", "--out", "taken/x"),
         ("taken/x", "cannot be written: Not a directory", "--out")),
     Bad("is-file", file_in_the_way("run", "suite.yaml", "--out", "taken"),
@@ -478,7 +478,7 @@ FOLDERS: tuple[Bad, ...] = (
     Bad("full-init", command("init", "new"), ("new", "cannot be written"),
         writes=("new",), bytes_left=100),
 )  # fmt: skip
-CACHES: tuple[Bad, ...] = (
+CACHES = (
     Bad("broken-cache", file("cache/replies.sqlite", b"not a database" * 40, *CACHED),
         ("replies.sqlite", "hint: "),
         writes=("fresh",)),
@@ -496,7 +496,7 @@ CACHES: tuple[Bad, ...] = (
     Bad("cache-below", file_in_the_way("run", "suite.yaml", "--out", "fresh", "--models", "alpha"),
         ("taken/x", "PHYBLOCK_CACHE"), env=(("PHYBLOCK_CACHE", "taken/x"),), writes=("fresh",)),
 )  # fmt: skip
-BAD: tuple[Bad, ...] = SUITES + OPTIONS + DATA + MODELS + FOLDERS + CACHES
+BAD = SUITES + OPTIONS + DATA + MODELS + FOLDERS + CACHES
 
 
 @pytest.fixture(scope="module")

@@ -206,7 +206,7 @@ def test_a_tilde_is_the_home_folder(suite, monkeypatch):
     assert not (suite.root / "~").exists()
 
 
-IN_THE_WAY: dict[str, tuple[Prepare, str]] = {
+IN_THE_WAY = {
     "report": (lambda run: put(run / "report"), "report: cannot be written in: it is not a folder"),
     "linked-report": (lambda run: link(run / "report"), "report: .*it is a link"),
     "linked-tables": (lambda run: link(run / "tables"), "tables: .*it is a link"),
@@ -244,7 +244,7 @@ def test_a_verb_writes_through_no_link(suite):
     assert not (suite.root / "elsewhere.yaml").exists()
 
 
-WRITING: dict[str, tuple[tuple[str, ...], str, str]] = {
+WRITING = {
     "export": (("export", "{run}", "--to", "csv"), "records.csv", "phyblock did not make"),
     "compare": (("compare", "{run}"), "ranks.csv", "phyblock did not make"),
     "figures": (("figures", "{run}", "--only", "errors"), "errors.pdf", "phyblock did not make"),

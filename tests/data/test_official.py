@@ -20,7 +20,7 @@ from phyblock.data.official import (
 from phyblock.data.scenes import read_builtin
 from phyblock.errors import DataError
 from phyblock.results.paper import published_table
-from tests.data.broken import Raw, sound_scene, with_value, write_checkout, write_scenes
+from tests.data.broken import sound_scene, with_value, write_checkout, write_scenes
 
 SCENE = {**sound_scene(), "levels": [3], "parents": ["s1"]}
 
@@ -152,13 +152,13 @@ def test_the_official_scenes(official_checkout):
             assert base.issuperset(task.scene.parents)
 
 
-COLOR: Raw = {
+COLOR = {
     "scene_id": "t1",
     "question": "What is the color of the block on top?",
     "options": ["red", "blue", "green", "yellow"],
     "answer": "B",
 }
-NEXT: Raw = {
+NEXT = {
     "scene_id": "t2",
     "question": "What comes next?",
     "options": ["<img1>", "<img2>", "<img3>", "<img4>"],

@@ -2,7 +2,6 @@
 
 import contextlib
 import copy
-from typing import Any
 
 import pytest
 from hypothesis import given, settings
@@ -16,7 +15,7 @@ from tests.data.broken import sound_scene, without, write_scenes
 from tests.fuzz.strategies import QUESTIONS
 from tests.workspace import tower, write_lines
 
-QUESTION: dict[str, Any] = {
+QUESTION = {
     "id": "co-001",
     "subtask": "CO",
     "category": "object_property",

@@ -69,7 +69,7 @@ def test_line_ends_of_any_kind_and_a_missing_last_one_are_read(tmp_path):
         assert len(read_builtin(tmp_path).tasks) == 2
 
 
-BROKEN_VALUES: dict[str, tuple[str, object, str]] = {
+BROKEN_VALUES = {
     # name: path, value, field of the problem
     "id is no string": ("id", 3, "id"),
     "id is empty": ("id", "", "id"),
@@ -172,7 +172,7 @@ def test_a_list_that_is_too_long_is_refused_in_few_words(tmp_path, at, value):
     assert {problem.field.partition("[")[0] for problem in found} == {at.partition(".")[0]}
 
 
-BROKEN_TEXTS: dict[str, tuple[bytes, str, str]] = {
+BROKEN_TEXTS = {
     # name: bytes, what stands after the file name in `where`, words of the message
     "empty file": (b"", "", "holds no scenes"),
     "blank line": (b"\n\n", ":1:1", "not JSON"),

@@ -99,7 +99,7 @@ SECTIONS = dict(
         re.MULTILINE | re.DOTALL,
     )
 )
-SHOWN: dict[str, tuple[str, str, dict[str, float | None], str, str]] = {
+SHOWN = {
     "A block shape": ("towers", "f1", {"oracle": 1.0, "random": None}, "table1.md", "hexagon"),
     "A background": ("grounds", "f1", {"random": None}, "sensitivity.md", "sand"),
     "A question kind": ("ground", "accuracy", {"oracle": 1.0}, "table2.md", "GR"),

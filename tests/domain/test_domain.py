@@ -9,13 +9,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from phyblock.domain.blocks import (
     BLOCK_TYPES,
     SHAPES,
-    BlockType,
     euler_deg_to_quat_xyzw,
     orientation_class,
     quat_xyzw_to_matrix,
@@ -45,7 +43,7 @@ def box(x, y, z):
 
 # Vertices [m], written here apart from the package: a block looks the same in two orientations
 # when its vertices fall on the same points.
-VERTICES: dict[BlockType, NDArray[np.float64]] = {
+VERTICES = {
     "cube": box(0.025, 0.025, 0.025),
     "cuboid1": box(0.025, 0.025, 0.0125),
     "cuboid2": box(0.05, 0.025, 0.0125),

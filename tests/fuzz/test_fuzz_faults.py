@@ -10,7 +10,6 @@ import tempfile
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 from hypothesis import given
@@ -22,13 +21,7 @@ from phyblock.records.record import Reply
 from tests.fuzz.laws import LedgerAgent, LedgerChat, Watch, asked_twice, kept_in, lost, run_watched
 from tests.fuzz.strategies import FAULTS, SEED, fuzzed
 from tests.models.factory import QUICK, ROUTES, Disk, Killing, command, make_request, run_command
-from tests.servers.batches import (
-    AnthropicBatches,
-    BatchFaults,
-    BatchServer,
-    GeminiBatches,
-    OpenAIBatches,
-)
+from tests.servers.batches import AnthropicBatches, BatchFaults, GeminiBatches, OpenAIBatches
 from tests.servers.chassis import Faults, Running
 from tests.servers.faults import WIRE_FAULTS
 from tests.servers.openai_chat import OpenAIChat
@@ -38,7 +31,7 @@ pytestmark = pytest.mark.fuzz
 
 _SHARE = 0.35
 _LONGEST_S = 300.0
-_TRACKS: dict[str, dict[str, Any]] = {
+_TRACKS = {
     "full_planning": {},
     "vqa": vqa_suite(subtasks=["SH", "OR", "VP"]),
     "step_planning": {"tracks": ["step_planning"], "steps": {"physics": "off"}},
@@ -160,7 +153,7 @@ class Forgetful(OpenAIBatches):
     forgets_names = True
 
 
-WAYS: dict[str, tuple[type[BatchServer], str]] = {
+WAYS = {
     "openai": (OpenAIBatches, "direct"),
     "forgetful": (Forgetful, "direct"),
     "anthropic": (AnthropicBatches, "anthropic"),

@@ -165,7 +165,7 @@ _ASK = ("run", "questions.yaml", "--dry-run")
 
 _ELSEWHERE = _TEXTS.filter(lambda text: ".." not in text and text[:1] not in ("/", "~"))
 
-KINDS: dict[str, Cases] = {
+KINDS = {
     "suites": _file("bad.yaml", SUITES, ("validate", "bad.yaml"), ("run", "bad.yaml", "--dry-run")),
     "models": _file("models.yaml", MODELS_FILES, ("validate", "models.yaml"), ("models",), DRY),
     "overrides": st.lists(OVERRIDES, min_size=1, max_size=3).map(

@@ -10,7 +10,6 @@ import signal
 import sqlite3
 import time
 from collections import Counter
-from typing import Any
 
 import pytest
 
@@ -24,7 +23,7 @@ AT_ONCE = 6
 PRICE = {"input": 10.0, "output": 100.0}
 CALL_USD = 1000 * PRICE["input"] / 1e6 + 40 * PRICE["output"] / 1e6
 """The server counts 1,000 tokens in and 40 out for every call."""
-TRACKS: dict[str, tuple[int, dict[str, Any]]] = {
+TRACKS = {
     "full_planning": (5, {}),
     "vqa": (8, vqa_suite(subtasks=["SH", "CO"])),
     "step_planning": (30, {"tracks": ["step_planning"], "steps": {"physics": "off"}}),

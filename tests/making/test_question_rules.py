@@ -31,7 +31,7 @@ from phyblock.making.questions.relations import (
     put_beside,
     tipped_over,
 )
-from phyblock.making.questions.sight import SHAPE_WORDS, Feature, names, resolve, resolve_one
+from phyblock.making.questions.sight import SHAPE_WORDS, names, resolve, resolve_one
 from phyblock.making.questions.structures import THIN_M, WIDE_M, bench, free_tops, is_sure, lowered
 from phyblock.making.questions.views import ViewpointMaker
 from phyblock.making.scenes.sketch import POSES, transformed
@@ -42,7 +42,7 @@ from tests.sim.structures import block as solid
 from tests.sim.structures import tower
 
 SCENES = [t.scene for t in read_builtin(bundled("benchmarks", "data", "phyblock-400")).tasks]
-FEATURES: tuple[Feature, ...] = ("color", "type", "layer", "side", "support")
+FEATURES = ("color", "type", "layer", "side", "support")
 scenes = st.sampled_from(SCENES[::9])
 seeds = st.integers(0, 2**32 - 1)
 

@@ -11,7 +11,7 @@ import pytest
 from phyblock.data.questions import StoredQuestion, read_questions
 from phyblock.data.scenes import read_builtin
 from phyblock.domain.blocks import COLORS
-from phyblock.domain.question import LETTERS, SUBTASKS, Subtask, rotated
+from phyblock.domain.question import LETTERS, SUBTASKS, rotated
 from phyblock.errors import DataError, StoreError
 from phyblock.files import bundled
 from phyblock.making.files import question_card, write_questions
@@ -31,8 +31,8 @@ FOLDER = bundled("benchmarks", "data", "phyblock-vqa")
 DATA = read_builtin(bundled("benchmarks", "data", "phyblock-400"))
 SCENES = {task.scene.id: task.scene for task in DATA.tasks}
 SOME = list(SCENES.values())[3::40]
-STATIC: tuple[Subtask, ...] = ("SH", "CO", "SI", "NU", "RP", "AP", "RD", "RR", "OC", "LC", "TC")
-ASKED: dict[Subtask, tuple[int, tuple[str, ...]]] = {
+STATIC = ("SH", "CO", "SI", "NU", "RP", "AP", "RD", "RR", "OC", "LC", "TC")
+ASKED = {
     "VP": (2, ("l3-061-house", "l4-051-combined", "l4-073-combined")),
     "CF": (5, ("l1-001-animal", "l1-025-bridge", "l2-001-animal", "l2-021-slide")),
     "PD": (2, ("l2-010-stair", "l2-028-gate", "l3-011-stair")),

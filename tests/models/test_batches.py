@@ -37,21 +37,11 @@ from tests.models.factory import (
     run_command,
     with_fields,
 )
-from tests.servers.batches import (
-    AnthropicBatches,
-    BatchFaults,
-    BatchServer,
-    GeminiBatches,
-    OpenAIBatches,
-)
+from tests.servers.batches import AnthropicBatches, BatchFaults, GeminiBatches, OpenAIBatches
 from tests.servers.chassis import Running
 from tests.workspace import KEY
 
-SERVERS: dict[str, type[BatchServer]] = {
-    "direct": OpenAIBatches,
-    "anthropic": AnthropicBatches,
-    "gemini": GeminiBatches,
-}
+SERVERS = {"direct": OpenAIBatches, "anthropic": AnthropicBatches, "gemini": GeminiBatches}
 PROTOCOLS = list(SERVERS)
 PRICE = {"input": 1000, "output": 1000, "batch": {"input": 500, "output": 500}}
 

@@ -4,7 +4,6 @@ import asyncio
 import json
 import re
 from dataclasses import replace
-from typing import Any
 
 import pytest
 from hypothesis import given
@@ -128,7 +127,7 @@ def candidate(*parts, **fields):
     return {"candidates": [{"content": {"parts": list(parts)}, **fields}]}
 
 
-SHAPES: dict[str, tuple[object, Reply]] = {
+SHAPES = {
     "openai": (
         {**choice({"role": "assistant", "content": STEPS, "refusal": None}), "model": "gpt",
          "usage": {"prompt_tokens": 7, "completion_tokens": 5, **DETAILS}},
@@ -182,7 +181,7 @@ def test_a_shape_is_read(name):
     assert read_raw_reply(raw, "000.json") == expected
 
 
-OTHERS: tuple[Any, ...] = (
+OTHERS = (
     {}, {"error": {"message": "overloaded"}}, {"choices": []}, [], "a text", None, 17,
     {"candidates": []}, {"content": "not a list"},
 )  # fmt: skip

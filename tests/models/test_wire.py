@@ -272,7 +272,7 @@ def test_the_transport_is_chosen_by_rule(model_id, api_base, transport, is_direc
 
 # What comes of it.
 
-ENDS: dict[str, tuple[type, int, tuple[str, ...]]] = {
+ENDS = {
     **dict.fromkeys(
         ("429", "500", "reset", "cut", "html", "empty"),
         (RetryableError, QUICK.attempts, tuple(ROUTES)),

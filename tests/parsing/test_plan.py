@@ -23,7 +23,7 @@ COUNTS = Path(__file__).with_name("recordings.csv")
 PLAN = (7, 7, 12, 3, 5, 9, 14, 2, 1)
 TEXT = asked(*PLAN)
 
-READ: dict[str, list[str]] = {
+READ = {
     "7 12 3": [
         "Step1: Move block with index 7\n\nStep2: Move block with index 12\nStep3: block 3",
         "**Step 1:** Move block with index 7\n**Step 2:** Move block #12\n**Step 3:** block 3.",

@@ -2,8 +2,6 @@
 
 import json
 import time
-from collections.abc import Callable
-from typing import Any
 
 import pytest
 from hypothesis import example, given, settings
@@ -15,7 +13,7 @@ from phyblock.parsing.move import parse_move
 from phyblock.parsing.plan import parse_plan
 from phyblock.parsing.poses import MOST_POSE_STEPS, parse_poses, pose_form
 
-REPLIES: list[tuple[str, str]] = [
+REPLIES = [
     ("Move(3)", "3 line"),
     ("Next plan: Move(3)", "3 line"),
     ("**Next plan:** Move( 3 ).", "3 line"),
@@ -76,7 +74,7 @@ def test_what_stands_before_the_asked_form_changes_nothing(number, text, is_json
 TEXTS = ("a red cube", "a blue cube", "an arch", "a cylinder")
 LENGTHS = ("5 cm", "7.5 cm", "10 cm", "15 cm")
 
-READ: list[tuple[str, str | None, str | None]] = [
+READ = [
     ("Answer: C", "C", "answer_line"),
     ("The span is bridged by one block.\n\n**Answer:** (C)", "C", "answer_line"),
     ("Answer: c", "C", "answer_line"),
@@ -267,7 +265,7 @@ def test_every_plan_of_the_asked_forms_is_read_as_it_is_written(plan, is_json):
 
 
 LINEAR_TEXTS = ("a red cube", "a blue cube", "an arch", "a cylinder")
-READERS: dict[str, Callable[[str], Any]] = {
+READERS = {
     "plan": lambda text: parse_plan(text, 16),
     "official": lambda text: parse_plan(text, 16, "official"),
     "move": parse_move,

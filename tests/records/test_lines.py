@@ -5,7 +5,6 @@ import json
 import os
 import re
 from pathlib import Path
-from typing import Any
 
 import jsonschema
 import pytest
@@ -22,7 +21,6 @@ from phyblock.records.record import Reply, Usage, validated
 from phyblock.results.load import load_run
 from tests.data.broken import (
     DAMAGED,
-    Raw,
     lines_before,
     plan_record,
     record_with,
@@ -84,7 +82,7 @@ def test_the_schemas_take_what_is_shipped(name, lines):
         found.validate(json.loads(line))
 
 
-BROKEN: dict[str, tuple[str, Raw, str, Any]] = {
+BROKEN = {
     "shape": ("scene", sound_scene(), "blocks.0.type", "ball"),
     "order": ("scene", sound_scene(), "blocks.0.order", 0),
     "position": ("scene", sound_scene(), "blocks.0.position", [0, 0]),

@@ -1,7 +1,6 @@
 """`run.yaml` is read within bounds; only a run's own records are counted, and go on in it."""
 
 import shutil
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -83,7 +82,7 @@ def runs(new_workspace):
     return made
 
 
-READERS: dict[str, Callable[[Path], object]] = {"load": load_run, "score": rescore}
+READERS = {"load": load_run, "score": rescore}
 
 
 @pytest.mark.parametrize("reader", READERS)

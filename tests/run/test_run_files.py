@@ -5,7 +5,6 @@ import hashlib
 import json
 import os
 import time
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -35,7 +34,7 @@ def test_what_is_appended_is_what_is_read(tmp_path_factory, batches):
     assert [json.loads(line) for line in lines] == [line for batch in batches for line in batch]
 
 
-CHANGES: dict[str, Callable[[Path], object]] = {
+CHANGES = {
     "removed": Path.unlink,
     "truncated": lambda path: path.write_bytes(b""),
     "replaced": lambda path: (path.rename(f"{path}.old"), path.write_bytes(b'{"a":1}\n')),

@@ -9,12 +9,12 @@ from phyblock.config.suite import Suite
 from phyblock.models.cache import reply_key
 from phyblock.run.plan import to_config
 from tests.models.factory import ask, make_model, make_request
-from tests.servers.chassis import Faults, LocalServer, Running
+from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.servers.other_protocols import AnthropicMessages, GeminiGenerate
 from tests.workspace import KEY_VARIABLE
 
-WAYS: list[tuple[str, str, str, type[LocalServer]]] = [
+WAYS = [
     ("OPENAI_BASE_URL", "openai/m", "/v1", OpenAIChat),
     ("OPENAI_API_BASE", "openai/m", "/v1", OpenAIChat),
     ("HOSTED_VLLM_API_BASE", "hosted_vllm/m", "/v1", OpenAIChat),

@@ -10,14 +10,7 @@ from hypothesis import strategies as st
 from scipy.optimize import linear_sum_assignment
 from scipy.spatial.transform import Rotation
 
-from phyblock.domain.blocks import (
-    BLOCK_TYPES,
-    SHAPES,
-    BlockType,
-    euler_deg_to_matrix,
-    symmetries,
-    turn_deg,
-)
+from phyblock.domain.blocks import BLOCK_TYPES, SHAPES, euler_deg_to_matrix, symmetries, turn_deg
 from phyblock.domain.scene import Block, Candidate, CandidateSet, Plan, Scene
 from phyblock.scoring.plan import Goal, most_placed
 from phyblock.scoring.pose import Laid, Piece, PoseScorer, overlap_volume, placed
@@ -25,7 +18,7 @@ from phyblock.scoring.pose_matching import Motion, Nearness, cheapest, matched
 from phyblock.sim.engine import quat_xyzw_to_euler_deg
 from phyblock.sim.geometry import collision_pieces
 
-KINDS: tuple[BlockType, ...] = ("cube", "cuboid2", "triangle", "arch")
+KINDS = ("cube", "cuboid2", "triangle", "arch")
 
 
 def pieces(block_type):

@@ -3,7 +3,6 @@
 import asyncio
 import math
 from itertools import pairwise, permutations
-from typing import Any
 
 import pytest
 from hypothesis import given
@@ -81,7 +80,7 @@ def test_a_plan_is_worth_the_same_in_either_numbering(tasks, place, seed, plan):
     assert named == [task.candidates[n] for n in in_file]
 
 
-_TRACKS: dict[str, Any] = {}
+_TRACKS = {}
 
 
 def _track(name):

@@ -2,7 +2,6 @@
 
 import re
 import shutil
-from typing import Any
 
 import pytest
 import yaml
@@ -56,10 +55,7 @@ STRUCTURE = """() => {
     }).map((one) => one.className),
   };
 }"""
-SOUND: dict[str, Any] = {
-    **{"nameless": [], "h1": 1, "jumps": [], "twice": [], "lost": []},
-    "unreached": [],
-}
+SOUND = {**{"nameless": [], "h1": 1, "jumps": [], "twice": [], "lost": []}, "unreached": []}
 CONTRAST = """() => {
   const parse = (text) => text.match(/[\\d.]+/g).map(Number);
   const over = (top, below) => {
@@ -383,7 +379,7 @@ def sample(track, model, key, **more):
     return "samples", {"s": f"{track}/{model}/{key}/s0", **more}
 
 
-VIEWS: dict[str, tuple[str, dict[str, str]]] = {
+VIEWS = {
     "results": ("results", {}),
     "model": ("model", {"m": "random"}),
     "scenes": ("scenes", {}),
