@@ -260,9 +260,8 @@ def test_an_impatient_cancellation_keeps_all_that_was_answered(workspace, monkey
 def test_a_reply_whose_judging_kills_workers_is_recorded_and_scored_later(
     inside, monkeypatch, capsys
 ):
-    workspace = inside
-    workspace.write_suite(tracks=["pose_planning"], models=["oracle"], pose={"views": ["oblique"]})
-    marks = workspace.root / "marks"
+    inside.write_suite(tracks=["pose_planning"], models=["oracle"], pose={"views": ["oblique"]})
+    marks = inside.root / "marks"
     marks.mkdir()
     whole = PosePlanning.judge_apart
 
@@ -273,7 +272,7 @@ def test_a_reply_whose_judging_kills_workers_is_recorded_and_scored_later(
 
     monkeypatch.setattr(PosePlanning, "judge_apart", fatal)
     call("run", "suite.yaml", "--out", "out", "--no-report", "--limit", "2")
-    lost, *others = sorted(workspace.records(), key=lambda record: record["scene"])
+    lost, *others = sorted(inside.records(), key=lambda record: record["scene"])
     assert lost["error"]["kind"] == "unjudged"
     assert lost["reply"]["text"].startswith("Step1")
     assert [record["outcome"] for record in others] == ["ok"]
@@ -285,15 +284,15 @@ def test_a_reply_whose_judging_kills_workers_is_recorded_and_scored_later(
     # A plan that takes too long is given up, in a worker or without one, and says so.
     monkeypatch.setattr(PosePlanning, "judge_apart", whole)
     monkeypatch.setattr(dynamics, "LONGEST_S", -1.0)
-    rescore(workspace.out)
-    kept = workspace.records()
+    rescore(inside.out)
+    kept = inside.records()
     given_up = next(record for record in kept if record["sample"] == lost["sample"])
     assert given_up["error"]["kind"] == "unjudged"
     assert "step 1 was not reached within -1 s" in given_up["error"]["message"]
     assert given_up["reply"] == lost["reply"]
     monkeypatch.undo()
-    rescore(workspace.out)
-    again = workspace.records()
+    rescore(inside.out)
+    again = inside.records()
     assert {record["outcome"] for record in again} == {"ok"}
     assert all(record["pose"]["completed"] and record["error"] is None for record in again)
 
@@ -301,8 +300,7 @@ def test_a_reply_whose_judging_kills_workers_is_recorded_and_scored_later(
 def test_a_reply_that_is_being_judged_at_a_second_interrupt_is_recorded(
     inside, monkeypatch, capsys
 ):
-    workspace = inside
-    workspace.write_suite(tracks=["pose_planning"], models=["oracle"], pose={"views": ["oblique"]})
+    inside.write_suite(tracks=["pose_planning"], models=["oracle"], pose={"views": ["oblique"]})
 
     async def slow(track, item, text, _):
         for _ in range(2):
@@ -313,7 +311,7 @@ def test_a_reply_that_is_being_judged_at_a_second_interrupt_is_recorded(
     monkeypatch.setattr(PosePlanning, "judge_apart", slow)
     call("run", "suite.yaml", "--out", "out", "--no-report", "--limit", "1")
     assert "(interrupted)" in capsys.readouterr().out
-    assert [record["outcome"] for record in workspace.records()] == ["ok"]
+    assert [record["outcome"] for record in inside.records()] == ["ok"]
 
 
 def test_no_process_outlives_a_killed_run(workspace):

@@ -281,8 +281,7 @@ def test_one_sample_goes_through_few_modules(inside):
     """From the arrival of the second request to that of the third: the end of one sample and the
     beginning of the next, in every thread.
     """
-    workspace = inside
-    workspace.write_suite(models=["alpha"], levels=[2, 3], settings=["A"])
+    inside.write_suite(models=["alpha"], levels=[2, 3], settings=["A"])
     entered = set()
 
     def profile(frame, event, _):
@@ -290,7 +289,7 @@ def test_one_sample_goes_through_few_modules(inside):
             entered.add(frame.f_code.co_filename)
 
     with Running(server := OpenAIChat()) as running:
-        workspace.write_models(running.url, "alpha", max_concurrency=1)
+        inside.write_models(running.url, "alpha", max_concurrency=1)
         threading.setprofile(profile)
         sys.setprofile(profile)
         try:

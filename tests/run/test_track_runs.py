@@ -55,9 +55,8 @@ def rules(record):
 
 def test_all_tracks_ask_and_read_by_the_schema(inside, capsys):
     """A whole run of three tracks and three models, and what the server saw."""
-    workspace = inside
-    write_questions(workspace.root / "questions", questions(subtasks=["SH", "OR"], per_subtask=1))
-    workspace.write_suite(
+    write_questions(inside.root / "questions", questions(subtasks=["SH", "OR"], per_subtask=1))
+    inside.write_suite(
         tracks=TRACKS,
         models=["alpha", "beta", "random"],
         vqa={"path": "./questions"},
@@ -69,13 +68,13 @@ def test_all_tracks_ask_and_read_by_the_schema(inside, capsys):
         base = {"api_base": f"{running.url}/v1"}
         entries = {name: {"id": f"hosted_vllm/{name}", **base} for name in ("alpha", "beta")}
         entries["beta"]["response_format"] = "never"
-        workspace.write_yaml("models.yaml", entries)
+        inside.write_yaml("models.yaml", entries)
         assert call("run", "suite.yaml", "--out", "out", "--no-report", "--limit", 2) == 0
     for one in server.seen:
         sent = one.params.get("response_format")
         assert (sent is not None) == (one.model == "alpha")
         assert sent is None or sent["json_schema"]["schema"] == schema_of(one)
-    records = workspace.records()
+    records = inside.records()
     assert Counter(record["track"] for record in records) == dict.fromkeys(TRACKS, 6)
     for record in records:
         how = {"alpha": "response_format", "beta": "prompt"}.get(record["model"])
@@ -86,31 +85,31 @@ def test_all_tracks_ask_and_read_by_the_schema(inside, capsys):
     plans = [r["parse"]["plan"] for r in records if r["track"] == "full_planning" and "asked" in r]
     assert plans == [[1, 2, 3, 4]] * 4
     for name in ("table1.md", "table2.md", "table3.md"):
-        assert "answers asked for as JSON" in workspace.tables()[name].decode()
+        assert "answers asked for as JSON" in inside.tables()[name].decode()
 
     # Under the other format it is another run; judged again it is the same.
     capsys.readouterr()
     with pytest.raises(InputError, match="another run"):
         call("run", "suite.yaml", "--out", "out", "--limit", 2, "--set", "answer_format=text")
     assert call("score", "out") == 0
-    again = workspace.records()
+    again = inside.records()
     judged = ("parse", "scores", "asked", "outcome", "turns", "answer")
     for one, other in zip(records, again, strict=True):
         assert [one.get(name) for name in judged] == [other.get(name) for name in judged]
 
     # A recording is read in the form in which it was asked for.
     lines = [json.dumps(r) for r in records if r["track"] == "full_planning"]
-    (workspace.root / "recorded").mkdir()
-    shutil.copy(workspace.out / "run.yaml", workspace.root / "recorded")
-    (workspace.root / "recorded" / "records.jsonl").write_text("\n".join(lines) + "\n")
-    workspace.write_yaml("models.yaml", {"alpha": {"replay": "./recorded"}})
-    workspace.write_suite(models=["alpha"])
+    (inside.root / "recorded").mkdir()
+    shutil.copy(inside.out / "run.yaml", inside.root / "recorded")
+    (inside.root / "recorded" / "records.jsonl").write_text("\n".join(lines) + "\n")
+    inside.write_yaml("models.yaml", {"alpha": {"replay": "./recorded"}})
+    inside.write_suite(models=["alpha"])
     with pytest.raises(InputError, match="was made with answer_format: json_schema"):
         call("validate", "suite.yaml")
-    workspace.write_suite(models=["alpha"], **FORMAT)
-    replayed = workspace.root / "replayed"
+    inside.write_suite(models=["alpha"], **FORMAT)
+    replayed = inside.root / "replayed"
     assert call("run", "suite.yaml", "--out", replayed, "--no-report", "--limit", 2) == 0
-    assert {rule for r in workspace.records(replayed) for rule in rules(r)} == {RULE}
+    assert {rule for r in inside.records(replayed) for rule in rules(r)} == {RULE}
 
 
 FEW_QUESTIONS = ["SH", "VP", "OR", "AD"]
@@ -324,17 +323,16 @@ def unsteady_scene():
 @pytest.mark.skipif(len(installed_engines()) < 2, reason="one engine is installed")
 def test_runs_in_two_engines_are_scored_anywhere_and_never_compared(inside, monkeypatch):
     """Falls are read from the records, whichever engine is here now."""
-    workspace = inside
-    workspace.write_scenes(unsteady_scene())
+    inside.write_scenes(unsteady_scene())
     suite = ("--models", "oracle", *SMALL, *DATA, "--set", "steps.physics=strict")
-    usual, other = (workspace.root / name for name in ENGINES)
+    usual, other = (inside.root / name for name in ENGINES)
     endings, names = {}, []
     for out in (usual, other):
         monkeypatch.setenv("PHYBLOCK_PHYSICS", out.name)
         names.append(described_engine())
         call("run", "steps", "--out", out, *suite)
         manifest = yaml.safe_load((out / "run.yaml").read_bytes())
-        (record,) = workspace.records(out)
+        (record,) = inside.records(out)
         assert record["engine"] == manifest["engine"]
         endings[manifest["engine"]] = record["ending"]
     assert endings == dict.fromkeys(names, "collapsed")

@@ -187,9 +187,8 @@ def test_a_step_has_one_error_the_first_in_time(task, one, error, end):
 def test_a_run_that_was_cut_goes_on_and_is_scored_again_without_an_engine(
     inside, monkeypatch, capsys
 ):
-    workspace = inside
     section, models = {"views": ["oblique"]}, ["oracle", "oracle-2d"]
-    workspace.write_suite(tracks=["pose_planning"], models=models, pose=section)
+    inside.write_suite(tracks=["pose_planning"], models=models, pose=section)
     run = ["run", "suite.yaml", "--out", "out", "--no-report"]
     assert not call(*run)
     assert "Pose planning" in capsys.readouterr().out
@@ -198,21 +197,21 @@ def test_a_run_that_was_cut_goes_on_and_is_scored_again_without_an_engine(
         kept = ("parse", "scores", "pose")
         return {one["sample"]: {name: one[name] for name in kept} for one in records}
 
-    whole = by_sample(workspace.records())
-    text = (workspace.out / "records.jsonl").read_text()
-    (workspace.out / "records.jsonl").write_text(text[: len(text) // 2])
+    whole = by_sample(inside.records())
+    text = (inside.out / "records.jsonl").read_text()
+    (inside.out / "records.jsonl").write_text(text[: len(text) // 2])
     assert not call(*run)
-    assert by_sample(workspace.records()) == whole
+    assert by_sample(inside.records()) == whole
     # What fell when it was asked is what fell: nothing is carried out again.
     monkeypatch.setattr(pose_track, "execute", None)
     monkeypatch.setattr(pose_track, "CARRY_VERSION", pose_track.CARRY_VERSION + 1)
-    again = workspace.root / "again"
-    shutil.copytree(workspace.out, again)
+    again = inside.root / "again"
+    shutil.copytree(inside.out, again)
     rescore(again)
     with pytest.raises(StoreError, match=r"pose_planning\.carrying"):
         call(*run)
-    assert by_sample(workspace.records(again)) == whole
-    table = pd.read_csv(workspace.out / "tables" / "table_c.csv").set_index("model")
+    assert by_sample(inside.records(again)) == whole
+    table = pd.read_csv(inside.out / "tables" / "table_c.csv").set_index("model")
     shown = ["f1_a", "f1_b", "f1_c", "stands", "completed"]
     assert table.loc["oracle", shown].tolist() == [100] * 5
     assert table.loc["oracle-2d", "f1_a"] == 100
