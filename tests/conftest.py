@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-from phyblock.data.base import Dataset
+from phyblock.data.base import Dataset, QuestionSet
 from tests.fork_server import ONE_THREAD, end_fork_server
-from tests.workspace import KEY, KEY_VARIABLE, Raw, Workspace
+from tests.workspace import KEY, KEY_VARIABLE, Raw, Workspace, write_questions
 
 OFFICIAL_MISSING = (
     "official PhyBlock data not found: put it at ../shared or set PHYBLOCK_OFFICIAL to the folder "
@@ -109,6 +109,14 @@ def towers(new_workspace: Callable[..., Workspace]) -> Dataset:
     from phyblock.data.scenes import read_builtin
 
     return read_builtin(new_workspace().root / "data")
+
+
+@pytest.fixture(scope="session")
+def question_set(tmp_path_factory: pytest.TempPathFactory, towers: Dataset) -> QuestionSet:
+    """The questions of a workspace, as they are read."""
+    from phyblock.data.questions import read_questions
+
+    return read_questions(write_questions(tmp_path_factory.mktemp("vqa") / "q"), towers)
 
 
 @pytest.fixture

@@ -46,10 +46,8 @@ def made(new_workspace):
     )
     with Running(OpenAIChat()) as running:
         workspace.write_models(running.url, "alpha", price={"input": 0.0, "output": 0.0})
-        done = workspace.run()
-    assert done.code == 0, done.err
-    done = workspace.phyblock("bundle", "out")
-    assert done.code == 0, done.err
+        workspace.completed()
+    workspace.does("bundle", "out")
     return workspace
 
 
@@ -104,8 +102,7 @@ def test_a_bundle_verifies_elsewhere_and_holds_nothing_of_this_machine(made, tmp
     for folder in folders(made):
         shutil.copytree(folder, elsewhere.root / folder.name)
     shutil.copy(made.out / "bundle.zip", elsewhere.root / "b.zip")
-    done = elsewhere.phyblock("verify", "b.zip", "--data", "data", "--data", "questions")
-    assert done.code == 0, done.err
+    done = elsewhere.does("verify", "b.zip", "--data", "data", "--data", "questions")
     assert "20 of 20 expected samples." in done.out
     assert "What was sent" in done.out
     for data, lacking in ((["--data", "data"], "questions questions"), ([], "data set data")):
@@ -130,8 +127,7 @@ def test_samples_that_were_left_out_are_counted(made, tmp_path):
     lines = (tmp_path / "run" / RECORDS).read_text(encoding="utf-8").splitlines(keepends=True)
     (tmp_path / "run" / RECORDS).write_text("".join(lines[1:]), encoding="utf-8")
     bundle_run(tmp_path / "run", made.root / "less.zip")
-    done = made.phyblock("verify", "less.zip", "--data", "data", "--data", "questions")
-    assert done.code == 0, done.err
+    done = made.does("verify", "less.zip", "--data", "data", "--data", "questions")
     assert "19 of 20 expected samples: the run is not complete" in done.out
 
 

@@ -31,6 +31,11 @@ T = TypeVar("T")
 SHARED = ("pictures", "goal-blind")
 """Folders of the cache."""
 COMMAND = (sys.executable, "-m", "phyblock")
+PRICE = {"input": 10.0, "output": 100.0}
+CALL_USD = 1000 * PRICE["input"] / 1e6 + 40 * PRICE["output"] / 1e6
+"""The server counts 1,000 tokens in and 40 out for every call."""
+TWICE = {"max_attempts": 2, "retry_for_s": 0.0}
+"""Limits of a run that gives up soon, however little time it took."""
 KEY_VARIABLE = "PHYBLOCK_TEST_KEY"
 """The variable that holds the key of every model here."""
 KEY = "sk-not-a-real-key-1234"
@@ -123,6 +128,11 @@ SCENES: tuple[Raw, ...] = (
 def shared_folders(pictures: Path) -> list[Path]:
     """The folder of each of `SHARED` for workspaces that share rendered pictures."""
     return [pictures, *map(pictures.with_name, SHARED[1:])]
+
+
+def _whole(done: Done) -> Done:
+    assert (done.code, done.err) == (0, ""), done.out + done.err
+    return done
 
 
 class Workspace:
@@ -225,9 +235,11 @@ class Workspace:
 
     def completed(self, *args: str | Path, **options: Any) -> Done:
         """Run, without an error."""
-        done = self.run(*args, **options)
-        assert (done.code, done.err) == (0, ""), done.out + done.err
-        return done
+        return _whole(self.run(*args, **options))
+
+    def does(self, *args: str | Path, **options: Any) -> Done:
+        """Call the command line, without an error."""
+        return _whole(self.phyblock(*args, **options))
 
     @contextmanager
     def served(
@@ -252,7 +264,7 @@ class Workspace:
     def scored(self, name: str = "scored") -> Path:
         """Copy the run, score the copy again, and return it."""
         copy = shutil.copytree(self.out, self.root / name)
-        assert self.phyblock("score", copy).code == 0
+        self.does("score", copy)
         return copy
 
     def start(self, *args: str | Path) -> Forked:

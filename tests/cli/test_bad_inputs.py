@@ -511,8 +511,7 @@ def finished(new_workspace):
     made.write_scenes()
     with Running(OpenAIChat()) as server:
         made.write_models(server.url, "alpha")
-        done = made.run()
-    assert done.code == 0, done.err
+        made.completed()
     return made
 
 

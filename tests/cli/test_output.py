@@ -62,8 +62,7 @@ def suite(workspace, monkeypatch):
 
 
 def test_a_pipe_gets_whole_tables_without_escapes(suite):
-    done = suite.run()
-    assert done.code == 0
+    done = suite.completed()
     assert "\x1b" not in done.out
     assert [row.split()[0] for row in done.out.splitlines() if "[" in row] == ["oracle", "random"]
     assert done.out.splitlines()[-1] == "out/tables"
@@ -125,8 +124,7 @@ def test_nothing_is_spent_unasked_where_nobody_can_be_asked(suite):
 
 
 def test_the_folder_of_a_run_is_found_again_without_naming_it(suite):
-    first = suite.phyblock("run", "suite.yaml")
-    assert first.code == 0
+    first = suite.does("run", "suite.yaml")
     (folder,) = (suite.root / "results").iterdir()
     assert folder.name.startswith("trial-")
     assert first.out.splitlines()[-1] == f"results/{folder.name}/report.html"

@@ -102,10 +102,10 @@ def test_a_call_that_may_cost_is_made_only_where_somebody_agrees(workspace):
         refused = workspace.phyblock("models", "check", "dear", env={"CI": "1"})
         assert (refused.code, running.server.requests) == (2, 0)
         assert "would cost money, and there is no terminal to ask on" in refused.err
-        assert workspace.phyblock("models", "check", "dear", "--yes").code == 0
+        workspace.does("models", "check", "dear", "--yes")
         assert running.server.requests == 1
         workspace.write_models(running.url, "free", price={"input": 0.0, "output": 0.0})
-        assert workspace.phyblock("models", "check", "free").code == 0
+        workspace.does("models", "check", "free")
         assert running.server.requests == 2
 
 
@@ -150,7 +150,7 @@ def played(new_workspace):
         seeds=list(range(8)),
         steps={"physics": "strict"},
     )
-    assert workspace.run("--no-cache").code == 0
+    workspace.completed("--no-cache")
     return workspace
 
 
@@ -159,8 +159,7 @@ def test_an_episode_is_shown_step_by_step(played):
     assert set(endings.values()) == {"completed", "collapsed"}
     fallen = next(seed for seed, ending in endings.items() if ending == "collapsed")
     gif = played.root / "a" / "out.gif"
-    done = played.phyblock("show", "out", f"oracle/seesaw/s{fallen}", "--gif", gif, "--size", "128")
-    assert (done.code, done.err) == (0, "")
+    done = played.does("show", "out", f"oracle/seesaw/s{fallen}", "--gif", gif, "--size", "128")
     assert "Collapsed" in done.out
     assert ["2.", "Move(3):", "Placed"] in [line.split()[:3] for line in done.out.splitlines()]
     assert "3 yellow cuboid3" in done.out
@@ -187,10 +186,9 @@ def test_a_film_tells_the_outcome_of_each_step_and_the_end(played):
 
 def test_a_plan_is_shown_from_its_prompt_to_its_verdicts(workspace):
     with workspace.served(OpenAIChat()):
-        assert workspace.run().code == 0
+        workspace.completed()
     shown = next(one for one in workspace.records() if one["scene"] == "t3")
-    done = workspace.phyblock("show", "out", "alpha/t3", env={"COLUMNS": "80"})
-    assert (done.code, done.err) == (0, "")
+    done = workspace.does("show", "out", "alpha/t3", env={"COLUMNS": "80"})
     assert max(map(len, done.out.splitlines())) <= 80
     parts = ("\nPrompt (", "\nReply\n", "\nRead\n", "\n1. block ", " blocks placed\n")
     order = [done.out.index(text) for text in parts]
@@ -204,10 +202,9 @@ def test_a_plan_is_shown_from_its_prompt_to_its_verdicts(workspace):
 def test_an_answer_is_shown_with_the_right_one(workspace):
     write_questions(workspace.root / "questions", questions(per_subtask=2, subtasks=("SH", "CO")))
     workspace.write_suite(**vqa_suite())
-    assert workspace.run("--models", "random").code == 0
+    workspace.completed("--models", "random")
     for shown in workspace.records()[:4]:
-        done = workspace.phyblock("show", "out", shown["sample"])
-        assert (done.code, done.err) == (0, "")
+        done = workspace.does("show", "out", shown["sample"])
         verdict = "right" if shown["answer"]["correct"] else "wrong: the answer is "
         assert f"\n{verdict}" in done.out
 

@@ -25,7 +25,7 @@ from tests.servers.batches import AnthropicBatches, BatchFaults, GeminiBatches, 
 from tests.servers.chassis import Faults, Running
 from tests.servers.faults import WIRE_FAULTS
 from tests.servers.openai_chat import OpenAIChat
-from tests.workspace import SCENES, SHARED, questions, vqa_suite, write_questions
+from tests.workspace import PRICE, SCENES, SHARED, questions, vqa_suite, write_questions
 
 pytestmark = pytest.mark.fuzz
 
@@ -215,7 +215,6 @@ def test_batches(way, faults, kills):
         assert set(answered.values()) == {1}, answered
 
 
-PRICE = {"input": 10.0, "output": 100.0}
 _ROUNDS = -(-FAULTS // 40)
 
 

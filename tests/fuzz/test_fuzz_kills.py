@@ -17,12 +17,9 @@ from tests.fuzz.laws import Ledger, LedgerAgent, LedgerChat, kept_in
 from tests.fuzz.strategies import KILLS, SEED
 from tests.run.test_track_runs import by_sample
 from tests.servers.chassis import FAULTS, Faults, Running
-from tests.workspace import SCENES, questions, vqa_suite, write_questions
+from tests.workspace import CALL_USD, PRICE, SCENES, questions, vqa_suite, write_questions
 
 AT_ONCE = 6
-PRICE = {"input": 10.0, "output": 100.0}
-CALL_USD = 1000 * PRICE["input"] / 1e6 + 40 * PRICE["output"] / 1e6
-"""The server counts 1,000 tokens in and 40 out for every call."""
 TRACKS = {
     "full_planning": (5, {}),
     "vqa": (8, vqa_suite(subtasks=["SH", "CO"])),

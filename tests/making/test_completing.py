@@ -139,8 +139,7 @@ def test_what_is_completed_is_a_data_set_that_validates_and_runs(workspace):
          "candidates": SCENES[0]["candidates"]},
     ]})  # fmt: skip
     before = source.read_bytes()
-    done = workspace.phyblock("scenes", "complete", "gables.yaml", "--jobs", "1")
-    assert done.code == 0, done.err
+    workspace.does("scenes", "complete", "gables.yaml", "--jobs", "1")
     folder = workspace.root / "gables-set"
     gables, tower = read_builtin(folder).tasks
     assert (len(gables.candidates), len(tower.candidates)) == (16, 16)
@@ -150,8 +149,7 @@ def test_what_is_completed_is_a_data_set_that_validates_and_runs(workspace):
     assert source.read_bytes() == before
     again = workspace.phyblock("scenes", "complete", "gables.yaml", "--jobs", "1")
     assert (again.code, "give another --out" in again.err) == (2, True)
-    assert workspace.phyblock("validate", "gables-set").code == 0
+    workspace.does("validate", "gables-set")
     workspace.write_suite(models=["oracle"], dataset={"path": "./gables-set"}, seeds=[0])
-    ran = workspace.run()
-    assert ran.code == 0, ran.err
+    workspace.completed()
     assert {record["outcome"] for record in workspace.records()} == {"ok"}

@@ -38,7 +38,7 @@ from tests.models.factory import (
 )
 from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat
-from tests.workspace import in_a_loop
+from tests.workspace import PRICE, in_a_loop
 
 
 def config(model_id, **fields):
@@ -272,9 +272,7 @@ def test_a_server_that_does_not_count_stops_within_the_limit(route, usage):
     server = OpenAIChat(usage=usage)
     budget = Budget(0.1)
     with Running(server) as running:
-        config = ROUTES[route].config(
-            running.url, price={"input": 10.0, "output": 100.0}, max_concurrency=4
-        )
+        config = ROUTES[route].config(running.url, price=PRICE, max_concurrency=4)
         asked = estimate(config, make_request())
         tariff = Tariff(input=10.0, output=100.0)
         dearest = most_usd(tariff, asked.prompt_tokens, asked.most_completion_tokens)
@@ -302,10 +300,7 @@ def test_a_server_that_does_not_count_stops_within_the_limit(route, usage):
 def test_a_failure_that_may_have_been_billed_counts_against_the_budget(mode, is_counted):
     budget = Budget(100.0)
     with Running(ROUTES["direct"].server(Faults(mode=mode))) as running:
-        model = make_model(
-            ROUTES["direct"].config(running.url, price={"input": 10.0, "output": 100.0}),
-            budget=budget,
-        )
+        model = make_model(ROUTES["direct"].config(running.url, price=PRICE), budget=budget)
         (answer,) = ask(model, make_request())
     assert isinstance(answer, RetryableError)
     assert (budget.spent_usd > 0.1) == is_counted
@@ -316,7 +311,7 @@ def test_a_reply_says_what_the_limit_counts_for_all_its_attempts(tmp_path):
     server = ROUTES["direct"].server(Faults(reset=0.2, malformed=0.2, server_error=0.2))
     requests = [make_request(f"{n:03}") for n in range(30)]
     with Running(server) as running, ReplyCache(tmp_path / "c.sqlite") as cache:
-        config = ROUTES["direct"].config(running.url, price={"input": 10.0, "output": 100.0})
+        config = ROUTES["direct"].config(running.url, price=PRICE)
         budget = Budget(100.0)
         replies = ask(make_model(config, cache=cache, budget=budget), *requests)
         again = ask(make_model(config, cache=cache, budget=Budget(1.0)), *requests)

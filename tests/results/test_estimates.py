@@ -237,12 +237,15 @@ def episodes(*records, missing="skip"):
     return run_of(records, facts)
 
 
+EPISODES = (
+    episode("alpha", "001", "pppop", "completed"),
+    episode("alpha", "002", "ppd", "done"),
+    episode("beta", "001", "o?oi?", "max_failures"),
+)
+
+
 def test_episodes_by_hand():
-    run = episodes(
-        episode("alpha", "001", "pppop", "completed"),
-        episode("alpha", "002", "ppd", "done"),
-        episode("beta", "001", "o?oi?", "max_failures"),
-    )
+    run = episodes(*EPISODES)
     assert value(run, "precision", criterion="placed") == 1
     assert value(run, "precision", criterion="attempted") == pytest.approx(6 / 7)
     assert value(run, "recall", criterion="placed") == 0.75

@@ -10,14 +10,13 @@ import pandas as pd
 import pytest
 from PIL import Image as PillowImage
 
-from phyblock.data.questions import read_questions
 from phyblock.domain.question import LETTERS, is_picture_option
 from phyblock.integrations import huggingface
 from phyblock.integrations.files import write_vlmevalkit
 from phyblock.results.export import export_frame, export_run
 from phyblock.results.load import load_run
 from tests.web.factory import LEVELS, manifest, record, score, write_run
-from tests.workspace import csv_rows, write_questions
+from tests.workspace import csv_rows
 
 HF = "the package datasets is not installed"
 
@@ -96,11 +95,6 @@ def test_a_hugging_face_dataset_has_the_right_rows(folder, tmp_path):
         assert rows["tp_a"][2:4] == [1, 1]
         assert rows["tp_a"][-3:] == [None, None, None]
         assert rows["answer_correct"][-2:] == [True, False]
-
-
-@pytest.fixture(scope="module")
-def question_set(tmp_path_factory, towers):
-    return read_questions(write_questions(tmp_path_factory.mktemp("vqa") / "q"), towers)
 
 
 def test_tsv_files_are_as_vlmevalkit_reads_them(question_set, towers, tmp_path):

@@ -17,7 +17,7 @@ from phyblock.results.tables import coverage_frame, make_tables, summary_of, wri
 from phyblock.results.text import NO_VALUE, Column, TextTable, number, to_latex, to_markdown
 from phyblock.tracks.base import kind_of
 from phyblock.types import OUTCOMES
-from tests.results.test_estimates import complete, episode, episodes, questions
+from tests.results.test_estimates import EPISODES, complete, episodes, questions
 from tests.web.factory import laws, manifest, record, record_lists, run_of, score, write_run
 
 
@@ -51,12 +51,7 @@ def test_tables_of_plans_show_estimates(records, missing):
 
 
 def test_tables_of_episodes_and_questions_show_estimates():
-    ran = episodes(
-        episode("alpha", "001", "pppop", "completed"),
-        episode("alpha", "002", "ppd", "done"),
-        episode("beta", "001", "o?oi?", "max_failures"),
-    )
-    assert shown_numbers(ran, "step_planning") > 20
+    assert shown_numbers(episodes(*EPISODES), "step_planning") > 20
     assert shown_numbers(questions(complete({"SH": 3, "OR": 1})), "vqa") > 20
 
 

@@ -91,8 +91,7 @@ def test_a_run_that_waits_is_stopped_and_goes_on_by_the_same_command(workspace):
         assert not server.by_sample
 
         server.batch_faults = BatchFaults()
-        done = workspace.run("--yes")
-        assert done.code == 0
+        done = workspace.completed("--yes")
         assert "All 10 samples are done" in done.out
         assert counted_once(server, 10)
 

@@ -133,15 +133,12 @@ def test_episodes_are_shuffled_and_blind_as_well(workspace):
         assert record["parse"]["file_plan"] == [order[n - 1] for n in plan]
         if record["model"] == "all-candidates":
             assert plan == list(range(1, len(plan) + 1))
-    one = "oracle/t3/s1"
-    assert (
-        workspace.phyblock("show", workspace.out, one, "--gif", workspace.root / "x.gif").code == 0
-    )
+    workspace.does("show", workspace.out, "oracle/t3/s1", "--gif", workspace.root / "x.gif")
 
 
 def test_blind_baselines_are_scored_beside_models_without_being_named(workspace):
     workspace.write_suite(models=["oracle"], levels=[4])
-    assert workspace.run().code == 0
+    workspace.completed()
     assert {record["model"] for record in workspace.records()} == {"oracle"}
     workspace.write_yaml("models.yaml", {"again": {"replay": str(workspace.out)}})
     workspace.out = workspace.root / "again"
@@ -156,7 +153,7 @@ def test_blind_baselines_are_scored_beside_models_without_being_named(workspace)
     # A run of baselines alone has those that it names.
     workspace.write_yaml("suite.yaml", {**suite, "models": ["random"]})
     workspace.out = workspace.root / "alone"
-    assert workspace.run().code == 0
+    workspace.completed()
     assert {record["model"] for record in workspace.records()} == {"random"}
 
 
@@ -202,7 +199,7 @@ def test_every_way_is_asked_once_and_the_reference_is_what_a_plain_suite_asks(wo
         assert factors == [*VARY, "items"]
         workspace.out = workspace.root / "plain"
         prepare(workspace, running.url, images={"size_px": 128, "background": "checkerboard"})
-        assert workspace.run("--models", "alpha").code == 0
+        workspace.completed("--models", "alpha")
         assert len(workspace.records()) == SCENES
         assert server.requests == WAYS * SCENES
         assert all("variant" not in record for record in workspace.records())

@@ -22,15 +22,18 @@ from tests.models.factory import ROUTES
 from tests.servers.billing import COMPLETION, PROVIDERS, BillingOpenAI, o200k_tokens, tile_tokens
 from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat, said
-from tests.workspace import KEY_VARIABLE, in_a_loop, questions, write_questions
+from tests.workspace import (
+    CALL_USD,
+    KEY_VARIABLE,
+    PRICE,
+    TWICE,
+    in_a_loop,
+    questions,
+    write_questions,
+)
 
-PRICE = {"input": 10.0, "output": 100.0}
-CALL_USD = 1000 * PRICE["input"] / 1e6 + 40 * PRICE["output"] / 1e6
-"""The server counts 1,000 tokens in and 40 out for every call."""
 MOST_USD = 0.505
 """Room for 35 calls, and for no 36th, be it as estimated at first or as the run learns to."""
-TWICE = {"max_attempts": 2, "retry_for_s": 0.0}
-"""Limits of a run that gives up soon, however little time it took."""
 
 
 def spent(workspace):
@@ -51,8 +54,7 @@ def test_the_limit_is_not_passed_and_a_higher_one_goes_on(workspace):
         assert spent(workspace) <= MOST_USD
 
         asked = server.requests
-        same = workspace.run("--set", f"limits.max_cost_usd={MOST_USD}")
-        assert same.code == 1
+        assert workspace.run("--set", f"limits.max_cost_usd={MOST_USD}").code == 1
         assert server.requests == asked
 
         more = workspace.completed("--set", "limits.max_cost_usd=5")
@@ -98,8 +100,7 @@ def test_a_dry_run_says_what_it_would_cost_and_asks_nothing(workspace):
         workspace.write_models(running.url, "alpha", price=PRICE, max_tokens=9000)
         workspace.write_suite(models=["alpha", "random"], seeds=[0, 1])
         before = workspace.files()
-        done = workspace.run("--dry-run")
-        assert done.code == 0
+        done = workspace.completed("--dry-run")
         assert "10 calls, about $" in done.out
         usual, most = re.findall(r"\$([\d.]+)", done.out)[:2]
         assert 10 * 4000 * PRICE["output"] / 1e6 < float(usual) < 5
@@ -107,7 +108,7 @@ def test_a_dry_run_says_what_it_would_cost_and_asks_nothing(workspace):
         assert running.server.requests == 0
         assert workspace.files() == before
 
-        assert workspace.run("--yes").code == 0
+        workspace.completed("--yes")
         after = workspace.run("--dry-run")
         assert "0 calls, about $0.00" in after.out
 
@@ -278,6 +279,5 @@ def test_a_run_without_a_limit_counts_once_there_is_one(workspace):
         assert workspace.run("--yes").code == 1
         asked, answered = server.requests, server.ended["ok"]
         assert 0 < answered < asked == 20
-        same = workspace.run("--set", f"limits.max_cost_usd={answered * CALL_USD}")
-        assert same.code == 1
+        assert workspace.run("--set", f"limits.max_cost_usd={answered * CALL_USD}").code == 1
         assert server.requests == asked

@@ -16,6 +16,7 @@ from phyblock.records.files import STOPPED, read_stopped
 from phyblock.results.load import load_run
 from tests.servers.chassis import ISSUE_MIX, Faults, Running
 from tests.servers.openai_chat import OpenAIChat
+from tests.workspace import TWICE
 
 
 class BySeed(OpenAIChat):
@@ -37,10 +38,6 @@ def is_scored(record):
     return found == {(setting, matcher) for setting in "AB" for matcher in ("optimal", "paper")}
 
 
-TWICE = {"max_attempts": 2, "retry_for_s": 0.0}
-"""Limits of a run that gives up soon, however little time it took."""
-
-
 def coverage(workspace):
     table = load_run(workspace.out).table("coverage").astype(str)
     return {row["model"]: row for row in table.to_dict("records")}
@@ -52,8 +49,7 @@ def test_every_sample_is_scored_through_the_mix_of_faults(workspace, samples):
     with workspace.served(
         OpenAIChat(faults, keep=False), seeds=list(range(samples // 5))
     ) as server:
-        done = workspace.run()
-    assert (done.code, done.err) == (0, "")
+        done = workspace.completed()
     assert f"All {samples:,} samples are done" in done.out
     records = workspace.records()
     assert len({record["sample"] for record in records}) == len(records) == samples
@@ -142,8 +138,7 @@ def test_a_sample_whose_every_attempt_failed_is_asked_again_by_the_next_run(work
         assert coverage(workspace)["alpha"]["api_error"] == "5"
 
         server._endings = {}
-        again = workspace.run()
-        assert again.code == 0
+        again = workspace.completed()
         assert server.requests == 20
     assert coverage(workspace)["alpha"]["api_error"] == "0"
     assert "All 10 samples are done" in again.out
@@ -195,7 +190,7 @@ def test_a_cache_that_takes_no_more_is_said_once_and_all_is_recorded(workspace, 
 
 def test_a_disk_that_takes_neither_replies_nor_records_ends_the_run_after_few_calls(workspace):
     with prepare(workspace, OpenAIChat(Faults(latency_s=0.01)), AT_ONCE) as server:
-        assert workspace.run("--limit", "1", "--models", "random").code == 0
+        workspace.completed("--limit", "1", "--models", "random")
         workspace.out = workspace.root / "full"
         done = workspace.run(bytes_left=20_000)
         assert done.code == 2

@@ -140,7 +140,7 @@ def test_every_record_names_a_prompt_that_is_there(workspace):
     workspace.write_suite(models=["alpha", "oracle"])
     with Running(OpenAIChat()) as running:
         workspace.write_models(running.url, "alpha")
-        assert workspace.run().code == 0
+        workspace.completed()
     prompts = read_prompts(workspace.out)
     sent = {record["prompt"]["messages"] for record in workspace.records() if record["prompt"]}
     assert sent == set(prompts) != set()
@@ -156,8 +156,7 @@ def test_tables_and_page_are_made_again_where_the_run_or_what_was_made_is_anothe
 
     def is_made(*, page=False):
         before = estimates.stat().st_mtime_ns if estimates.exists() else 0
-        done = workspace.run(page=page)
-        assert done.code == 0
+        done = workspace.completed(page=page)
         ends.add(done.out.replace("out/report.html", "out/tables"))
         return estimates.stat().st_mtime_ns != before
 
@@ -188,6 +187,6 @@ def test_a_run_whose_records_are_taken_away_asks_no_more_and_says_so(workspace):
         assert "records.jsonl: was removed, replaced or changed" in errors
         assert server.requests < 100
         asked = server.requests
-        assert workspace.run("--yes").code == 0
+        workspace.completed("--yes")
         assert server.requests == 100 < asked + 100
     assert len(workspace.records()) == 100

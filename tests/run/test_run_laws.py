@@ -34,8 +34,7 @@ def finished(new_workspace):
     made.write_suite(models=["alpha", "random", "oracle"], seeds=[0, 1, 2])
     with Running(OpenAIChat()) as running:
         made.write_models(running.url, "alpha")
-        done = made.run()
-    assert (done.code, done.err) == (0, "")
+        made.completed()
     return made
 
 
@@ -57,8 +56,7 @@ def scores(records):
 
 def test_tables_follow_from_the_records_byte_for_byte(copy):
     files, tables = copy.files(), copy.tables()
-    done = copy.phyblock("score", "out", fresh=True)
-    assert (done.code, done.err) == (0, "")
+    copy.does("score", "out", fresh=True)
     assert lasting(copy.files()) == lasting(files)
     path = copy.out / "records.jsonl"
     lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
@@ -66,12 +64,11 @@ def test_tables_follow_from_the_records_byte_for_byte(copy):
     path.write_text("".join(lines), encoding="utf-8")
     # Tables alone are made anew, in a process of another hash seed; then without the data.
     shutil.rmtree(copy.out / "tables")
-    assert copy.run(fresh=True).code == 0
+    copy.completed(fresh=True)
     assert copy.tables() == tables
     shutil.rmtree(copy.out / "tables")
     (copy.root / "data").rename(copy.root / "elsewhere")
-    done = copy.phyblock("report", "out")
-    assert (done.code, done.err) == (0, "")
+    copy.does("report", "out")
     assert copy.tables() == tables
 
 
@@ -103,8 +100,7 @@ def test_without_the_cache_it_is_neither_read_nor_written(copy):
     copy.out = copy.root / "uncached"
     with Running(OpenAIChat()) as running:
         copy.write_models(running.url, "alpha")
-        done = copy.run("--no-cache")
-        assert done.code == 0
+        done = copy.completed("--no-cache")
         assert "in the cache" not in done.out
         assert running.server.requests == 15
     assert scores(copy.records()) == first
@@ -139,7 +135,7 @@ def test_a_second_process_is_refused_and_the_first_goes_on(workspace):
 
 def test_a_limit_keeps_some_of_every_level_and_is_a_run_of_its_own(copy):
     copy.out = copy.root / "few"
-    assert copy.run("--limit", "3", "--models", "oracle").code == 0
+    copy.completed("--limit", "3", "--models", "oracle")
     records = copy.records()
     assert len({r["scene"] for r in records}) == 3
     assert {level for r in records for level in r["levels"]} == {1, 2, 3, 4}
@@ -155,7 +151,7 @@ def test_only_what_may_change_a_reply_makes_another_run(copy):
     done = copy.completed(*sets, "--models", "oracle,random,alpha")
     assert "All 45 samples are done" in done.out
     copy.write_models("http://127.0.0.1:9", "alpha", temperature=0.5)
-    assert copy.run("--models", "oracle").code == 0
+    copy.completed("--models", "oracle")
     done = copy.run("--models", "alpha")
     assert done.code == 2
     assert "found: different: models.alpha.params" in done.err
@@ -190,8 +186,7 @@ def test_a_folder_that_holds_no_record_is_free_for_the_mended_suite(workspace):
     with workspace.served(OpenAIChat(), prompt="mine.j2"):
         assert workspace.run().code == 2
         template.write_text("{% block user %}right{% endblock %}", encoding="utf-8")
-        done = workspace.run()
-    assert (done.code, done.err) == (0, "")
+        workspace.completed()
 
 
 @pytest.mark.parametrize("track", ["full_planning", "step_planning"])
@@ -219,15 +214,15 @@ def test_what_is_no_version_is_refused(tmp_path, text):
 
 def test_runs_on_two_versions_are_not_mixed(workspace):
     workspace.write_suite(levels=[1])
-    assert workspace.run().code == 0
-    assert workspace.run().code == 0
+    workspace.completed()
+    workspace.completed()
     (workspace.root / "data" / VERSION_FILE).write_text("2\n", encoding="utf-8")
     refused = workspace.run()
     assert refused.code != 0
     assert "out: holds another run" in refused.err
     assert "dataset.version (1, now 2)" in refused.err
     newer = workspace.root / "newer"
-    assert workspace.phyblock("run", "suite.yaml", "--out", newer, "--no-report").code == 0
+    workspace.does("run", "suite.yaml", "--out", newer, "--no-report")
     versions = [read_manifest(path).dataset for path in (workspace.out, newer)]
     assert [data.version for data in versions if data is not None] == [1, 2]
     with pytest.raises(SpecError, match=r"dataset\.version: cannot be compared"):
@@ -258,7 +253,7 @@ def test_scores_can_be_made_where_the_data_set_has_moved(copy):
     lost = manifest.read_text(encoding="utf-8").replace("root: ", "root: /nowhere")
     manifest.write_text(lost, encoding="utf-8")
     assert copy.phyblock("score", "out").code == 2
-    assert copy.phyblock("score", "out", "--data", "moved").code == 0
+    copy.does("score", "out", "--data", "moved")
 
 
 # The path of one sample: the modules that it goes through, and those it imports.

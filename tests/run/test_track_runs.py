@@ -199,8 +199,7 @@ def test_pictures_of_official_files_are_sent_byte_for_byte(workspace):
         workspace.write_models(running.url, "alpha", transport="direct")
         fields = vqa_suite(format="official", circular=True)
         workspace.write_suite(**{**fields, "models": ["alpha"]})
-        done = workspace.run()
-    assert (done.code, done.err) == (0, "")
+        workspace.completed()
     first, *others = digests.values()
     sent = [tuple(digest for _, digest in shown(seen)) for seen in server.seen]
     turned = {(first, *others[by:], *others[:by]) for by in range(4)}
@@ -268,7 +267,7 @@ def by_sample(records):
 
 def test_the_server_sees_goal_candidates_current_picture_and_history(workspace):
     with prepare(workspace, StepAgent()) as server:
-        assert workspace.run().code == 0
+        workspace.completed()
         seen = server.seen
     records = workspace.records()
     assert sum(len(record["turns"]) for record in records) == len(seen)
@@ -301,7 +300,7 @@ def test_faults_change_nothing(workspace):
     for faults in (Faults(), ISSUE_MIX):
         with prepare(workspace, StepAgent(Faults(**{**vars(faults), "retry_after": "0"}))):
             workspace.out = workspace.root / f"out{len(found)}"
-            assert workspace.run("--no-cache", *FEW).code == 0
+            workspace.completed("--no-cache", *FEW)
             found.append(by_sample(workspace.records()))
     assert found[0] == found[1]
 
@@ -348,5 +347,5 @@ def test_runs_in_two_engines_are_scored_anywhere_and_never_compared(inside, monk
 @pytest.mark.parametrize(("mode", "outcome"), [("length", "truncated"), ("filtered", "refusal")])
 def test_an_episode_of_which_no_reply_is_whole_is_no_parse_failure(workspace, mode, outcome):
     with prepare(workspace, StepAgent(Faults(mode=mode))):
-        assert workspace.run(*FEW).code == 0
+        workspace.completed(*FEW)
     assert {record["outcome"] for record in workspace.records()} == {outcome}

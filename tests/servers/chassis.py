@@ -130,7 +130,6 @@ class LocalServer(ABC):
         self.elsewhere = elsewhere
         self.holds = holds
         self.at_once = 0
-        self.most_at_once = 0
         self.forget(faults)
 
     def forget(self, faults: Faults | None = None) -> None:
@@ -168,7 +167,6 @@ class LocalServer(ABC):
     async def handle(self, request: web.Request) -> web.StreamResponse:
         async with self._gate:
             self.at_once += 1
-            self.most_at_once = max(self.most_at_once, self.at_once)
             try:
                 return await self._handle(request)
             finally:

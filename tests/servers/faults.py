@@ -41,6 +41,10 @@ class Fault:
     ending: Ending
 
 
+def _fault(behave: Callable[..., Any], *, ending: Ending = "retryable", **options: Any) -> Fault:
+    return Fault(partial(behave, **options), ending)
+
+
 def reset_connection(request: web.Request) -> web.Response:
     """Send a TCP reset in the place of (the rest of) an answer."""
     transport = request.transport
@@ -61,14 +65,15 @@ async def _redirect(
 
 
 def _sent(
-    ending: Ending, body: Any = None, status: int = 200, headers: Mapping[str, str] | None = None
+    body: Any = None, status: int = 200, ending: Ending = "retryable", **headers: str
 ) -> Fault:
     """An answer with this status and body: bytes as they are, anything else as JSON."""
     data = body if body is None or isinstance(body, bytes) else json.dumps(body).encode()
 
     async def behave(_: LocalServer, __: Seen, ___: web.Request) -> web.Response:
         kind = None if data is None else "application/json"
-        return web.Response(body=data, status=status, headers=headers, content_type=kind)
+        named = {name.replace("_", "-"): value for name, value in headers.items()}
+        return web.Response(body=data, status=status, headers=named, content_type=kind)
 
     return Fault(behave, ending)
 
@@ -226,120 +231,104 @@ _DEEP = b'{"choices": ' + b"[" * 100_000 + b"]" * 100_000 + b"}"
 _QUOTA = "You exceeded your current quota"
 
 _ERRORS_IN_200: Mapping[str, Fault] = {
-    "200-quota": _sent("unavailable", _error(_QUOTA, "insufficient_quota")),
-    "200-code-401": _sent("unavailable", _error("No auth credentials found", "401")),
-    "200-code-401-number": _sent("unavailable", _error("No auth credentials found", 401)),
-    "200-code-429": _sent("retryable", _error("Upstream is down", 429)),
-    "200-code-500": _sent("retryable", _error("Upstream is down", 500)),
-    "200-code-object": _sent("retryable", _error("Upstream is down", {"status": 401})),
-    "200-code-huge": _sent("retryable", _error("Upstream is down", 10**30)),
-    "200-message-object": _sent("retryable", _error({"text": "Upstream is down"}, None)),
-    "200-error-string": _sent("retryable", {"error": "Upstream is down"}),
-    "200-error-list": _sent("retryable", {"error": ["Upstream is down"]}),
-    "200-error-empty": _sent("retryable", {"error": {}}),
-    "200-error-and-null-choices": _sent(
-        "retryable", {**_error("Upstream is down", 502), "choices": None}
-    ),
-    "200-string": _sent("retryable", "Upstream is down"),
-    "200-null": _sent("retryable", b"null"),
-    "200-number": _sent("retryable", b"7"),
-    "200-list": _sent("retryable", []),
-    "200-empty-object": _sent("retryable", {}),
-    "200-empty": _sent("retryable", b""),
-    "200-no-utf-8": _sent("retryable", b'{"choices": "\xff\xfe"}'),
-    "200-nan": _sent("retryable", b'{"choices": NaN}'),
-    "200-deep": _sent("retryable", _DEEP),
-    "200-huge-number": _sent("retryable", b'{"choices": ' + b"9" * 100_000 + b"}"),
+    "200-quota": _sent(_error(_QUOTA, "insufficient_quota"), ending="unavailable"),
+    "200-code-401": _sent(_error("No auth credentials found", "401"), ending="unavailable"),
+    "200-code-401-number": _sent(_error("No auth credentials found", 401), ending="unavailable"),
+    "200-code-429": _sent(_error("Upstream is down", 429)),
+    "200-code-500": _sent(_error("Upstream is down", 500)),
+    "200-code-object": _sent(_error("Upstream is down", {"status": 401})),
+    "200-code-huge": _sent(_error("Upstream is down", 10**30)),
+    "200-message-object": _sent(_error({"text": "Upstream is down"}, None)),
+    "200-error-string": _sent({"error": "Upstream is down"}),
+    "200-error-list": _sent({"error": ["Upstream is down"]}),
+    "200-error-empty": _sent({"error": {}}),
+    "200-error-and-null-choices": _sent({**_error("Upstream is down", 502), "choices": None}),
+    "200-string": _sent("Upstream is down"),
+    "200-null": _sent(b"null"),
+    "200-number": _sent(b"7"),
+    "200-list": _sent([]),
+    "200-empty-object": _sent({}),
+    "200-empty": _sent(b""),
+    "200-no-utf-8": _sent(b'{"choices": "\xff\xfe"}'),
+    "200-nan": _sent(b'{"choices": NaN}'),
+    "200-deep": _sent(_DEEP),
+    "200-huge-number": _sent(b'{"choices": ' + b"9" * 100_000 + b"}"),
 }
 """Bodies that come with status 200 and are no reply."""
 
 _STATUSES: Mapping[str, Fault] = {
-    "201-empty": _sent("retryable", b"", 201),
-    "202-accepted": _sent("retryable", {"status": "queued"}, 202),
-    "204": _sent("retryable", None, 204),
-    "400-string": _sent("sample", {"error": "Invalid value for messages"}, 400),
-    "401-string": _sent("unavailable", {"error": "Unauthorized"}, 401),
-    "402": _sent("unavailable", _error("Insufficient credits", 402), 402),
-    "408": _sent("retryable", b"", 408),
-    "429-bare": _sent("retryable", {"error": "Too many requests"}, 429),
-    "429-soon": _sent(
-        "retryable", {"error": "Too many requests"}, 429, headers={"Retry-After": "0"}
-    ),
-    "429-broken-wish": _sent(
-        "retryable", {"error": "Too many"}, 429, headers={"Retry-After": "soon"}
-    ),
-    "429-endless-wish": _sent(
-        "retryable", {"error": "Too many"}, 429, headers={"Retry-After": "1e400"}
-    ),
-    "429-no-wish": _sent("retryable", {"error": "Too many"}, 429, headers={"Retry-After": "nan"}),
-    "500-string": _sent("retryable", {"error": "Internal error"}, 500),
-    "500-deep": _sent("retryable", _DEEP, 500),
-    "502-page": _sent("retryable", b"<html>Bad gateway</html>", 502),
-    "503": _sent("retryable", _error("Overloaded", None), 503),
-    "529": _sent("retryable", _error("Overloaded", None), 529),
+    "201-empty": _sent(b"", 201),
+    "202-accepted": _sent({"status": "queued"}, 202),
+    "204": _sent(None, 204),
+    "400-string": _sent({"error": "Invalid value for messages"}, 400, "sample"),
+    "401-string": _sent({"error": "Unauthorized"}, 401, "unavailable"),
+    "402": _sent(_error("Insufficient credits", 402), 402, "unavailable"),
+    "408": _sent(b"", 408),
+    "429-bare": _sent({"error": "Too many requests"}, 429),
+    "429-soon": _sent({"error": "Too many requests"}, 429, Retry_After="0"),
+    "429-broken-wish": _sent({"error": "Too many"}, 429, Retry_After="soon"),
+    "429-endless-wish": _sent({"error": "Too many"}, 429, Retry_After="1e400"),
+    "429-no-wish": _sent({"error": "Too many"}, 429, Retry_After="nan"),
+    "500-string": _sent({"error": "Internal error"}, 500),
+    "500-deep": _sent(_DEEP, 500),
+    "502-page": _sent(b"<html>Bad gateway</html>", 502),
+    "503": _sent(_error("Overloaded", None), 503),
+    "529": _sent(_error("Overloaded", None), 529),
 }
 """Answers by their status alone."""
 
-_CHANGES: Mapping[str, tuple[Callable[[dict[str, Any], Seen], Any], Ending]] = {
-    "null-choices": (_emptied(None), "retryable"),
-    "choices-of-strings": (_emptied(["a", "b"]), "retryable"),
-    "choices-object": (_emptied({"0": {}}), "retryable"),
-    "deep-beside-choices": (_nested, "retryable"),
-    "surrogate": (lambda body, _: _texts(body, "Step1: \ud800 index 1"), "reply"),
-    "echo-key-in-reply": (_with_key, "reply"),
-    "usage-missing": (_usage("missing"), "reply"),
-    "usage-null": (_usage(None), "reply"),
-    "usage-zero": (_usage(0), "reply"),
-    "usage-negative": (_usage(-1_000_000), "reply"),
-    "usage-huge": (_usage(10**30), "reply"),
-    "usage-true": (_usage(True), "reply"),
-    "usage-fraction": (_usage(12.5), "reply"),
-    "usage-text": (_usage("many"), "reply"),
+_CHANGES: Mapping[str, Fault] = {
+    "null-choices": _fault(_changed, change=_emptied(None)),
+    "choices-of-strings": _fault(_changed, change=_emptied(["a", "b"])),
+    "choices-object": _fault(_changed, change=_emptied({"0": {}})),
+    "deep-beside-choices": _fault(_changed, change=_nested),
+    "surrogate": _fault(
+        _changed, ending="reply", change=lambda body, _: _texts(body, "Step1: \ud800 index 1")
+    ),
+    "echo-key-in-reply": _fault(_changed, ending="reply", change=_with_key),
+    "usage-missing": _fault(_changed, ending="reply", change=_usage("missing")),
+    "usage-null": _fault(_changed, ending="reply", change=_usage(None)),
+    "usage-zero": _fault(_changed, ending="reply", change=_usage(0)),
+    "usage-negative": _fault(_changed, ending="reply", change=_usage(-1_000_000)),
+    "usage-huge": _fault(_changed, ending="reply", change=_usage(10**30)),
+    "usage-true": _fault(_changed, ending="reply", change=_usage(True)),
+    "usage-fraction": _fault(_changed, ending="reply", change=_usage(12.5)),
+    "usage-text": _fault(_changed, ending="reply", change=_usage("many")),
 }
 """Good replies in which something is changed."""
 
 WIRE_FAULTS: Mapping[str, Fault] = {
     **{
-        f"redirect-{status}-{'away' if away else 'here'}": Fault(
-            partial(_redirect, status=status, away=away), "unavailable"
+        f"redirect-{status}-{'away' if away else 'here'}": _fault(
+            _redirect, ending="unavailable", status=status, away=away
         )
         for status in (301, 302, 303, 307, 308)
         for away in (False, True)
     },
-    "redirect-nowhere": _sent("unavailable", status=302),
-    "redirect-garbled": _sent("unavailable", status=302, headers={"Location": "http://[::1/v1"}),
+    "redirect-nowhere": _sent(status=302, ending="unavailable"),
+    "redirect-garbled": _sent(status=302, ending="unavailable", Location="http://[::1/v1"),
     **_ERRORS_IN_200,
     **_STATUSES,
-    **{
-        name: Fault(partial(_changed, change=change), ending)
-        for name, (change, ending) in _CHANGES.items()
-    },
-    "echo-key-json": Fault(partial(_echo, status=400, shape="json"), "sample"),
-    "echo-key-cut": Fault(partial(_echo, status=400, shape="cut"), "sample"),
-    "echo-key-page": Fault(partial(_echo, status=200, shape="page"), "retryable"),
-    "reset-midway": Fault(partial(_reset_midway, claimed=0, resets=True), "retryable"),
-    "short-body": Fault(partial(_reset_midway, claimed=5_000, resets=False), "retryable"),
-    "no-http": Fault(partial(_raw, data=b"HELO mail.example\r\n\r\n"), "retryable"),
-    "no-head": Fault(partial(_raw, data=b""), "retryable"),
-    "huge-header": Fault(
-        partial(_raw, data=b"HTTP/1.1 200 OK\r\nX: " + b"x" * 200_000 + b"\r\n\r\n"), "retryable"
-    ),
-    "bad-chunk": Fault(
-        partial(_raw, data=b"HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\nxyz\r\n"),
-        "retryable",
-    ),
-    "endless": Fault(partial(_stream, chunk=b" " * 65_536, pause_s=0), "retryable"),
-    "endless-gzip": Fault(
-        partial(_stream, chunk=gzip.compress(b" " * 2**20), pause_s=0, encoding="gzip"), "retryable"
-    ),
-    "drip": Fault(partial(_stream, chunk=b" ", pause_s=_DRIP_S), "retryable"),
-    "gzip": Fault(partial(_packed, encoding="gzip"), "reply"),
-    "deflate": Fault(partial(_packed, encoding="deflate"), "reply"),
-    "gzip-cut": Fault(partial(_packed, encoding="gzip", share=0.5), "retryable"),
-    "gzip-that-is-none": Fault(partial(_packed, encoding="gzip", share=0.0), "retryable"),
-    "brotli-that-is-none": Fault(partial(_packed, encoding="br"), "retryable"),
-    "gzip-bomb": Fault(partial(_explode, encoding="gzip"), "retryable"),
-    "deflate-bomb": Fault(partial(_explode, encoding="deflate"), "retryable"),
-    "gzip-twice-bomb": Fault(partial(_explode, encoding="gzip, gzip"), "retryable"),
+    **_CHANGES,
+    "echo-key-json": _fault(_echo, ending="sample", status=400, shape="json"),
+    "echo-key-cut": _fault(_echo, ending="sample", status=400, shape="cut"),
+    "echo-key-page": _fault(_echo, status=200, shape="page"),
+    "reset-midway": _fault(_reset_midway, claimed=0, resets=True),
+    "short-body": _fault(_reset_midway, claimed=5_000, resets=False),
+    "no-http": _fault(_raw, data=b"HELO mail.example\r\n\r\n"),
+    "no-head": _fault(_raw, data=b""),
+    "huge-header": _fault(_raw, data=b"HTTP/1.1 200 OK\r\nX: " + b"x" * 200_000 + b"\r\n\r\n"),
+    "bad-chunk": _fault(_raw, data=b"HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\nxyz\r\n"),
+    "endless": _fault(_stream, chunk=b" " * 65_536, pause_s=0),
+    "endless-gzip": _fault(_stream, chunk=gzip.compress(b" " * 2**20), pause_s=0, encoding="gzip"),
+    "drip": _fault(_stream, chunk=b" ", pause_s=_DRIP_S),
+    "gzip": _fault(_packed, ending="reply", encoding="gzip"),
+    "deflate": _fault(_packed, ending="reply", encoding="deflate"),
+    "gzip-cut": _fault(_packed, encoding="gzip", share=0.5),
+    "gzip-that-is-none": _fault(_packed, encoding="gzip", share=0.0),
+    "brotli-that-is-none": _fault(_packed, encoding="br"),
+    "gzip-bomb": _fault(_explode, encoding="gzip"),
+    "deflate-bomb": _fault(_explode, encoding="deflate"),
+    "gzip-twice-bomb": _fault(_explode, encoding="gzip, gzip"),
 }
 """Every fault by its name."""

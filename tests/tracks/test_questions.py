@@ -10,7 +10,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.data.base import QuestionSet, QuestionTask
-from phyblock.data.questions import read_questions
 from phyblock.domain.question import LETTERS, SUBTASKS, Question, rotated
 from phyblock.domain.scene import Scene
 from phyblock.models.request import Image
@@ -25,16 +24,11 @@ from phyblock.tracks.questions import (
     select_questions,
 )
 from tests.tracks.conftest import track_of
-from tests.workspace import in_a_loop, write_questions
+from tests.workspace import in_a_loop
 
 STYLE = PictureStyle(size_px=128)
 LEVELS = (1, 2, 3, 4)
 OPTIONS = ("cube", "arch", "cylinder", "cuboid")
-
-
-@pytest.fixture(scope="module")
-def question_set(tmp_path_factory, towers):
-    return read_questions(write_questions(tmp_path_factory.mktemp("vqa") / "q"), towers)
 
 
 def opened(found, shop, size_px=128, **vqa):

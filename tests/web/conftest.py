@@ -138,8 +138,7 @@ def made(new_workspace: Callable[..., Workspace]) -> Workspace:
         steps={"physics": "off"},
         seeds=[0, 1],
     )
-    done = made.run()
-    assert done.code == 0, done.err
+    made.completed()
     path = made.out / "records.jsonl"
     lines = read_lines(path)
     for record in lines:
@@ -155,8 +154,7 @@ def made(new_workspace: Callable[..., Workspace]) -> Workspace:
         if record["sample"] == "full_planning/random/t4/s0":
             record.update(reply=None, outcome="missing", scores=[], parse=None)
     write_lines(path, lines)
-    done = made.phyblock("report", made.out)
-    assert done.code == 0, done.err
+    made.does("report", made.out)
     return made
 
 
@@ -188,12 +186,11 @@ def runs(new_workspace: Callable[..., Workspace]) -> Workspace:
     tracks = ["full_planning", "vqa", "step_planning", "pose_planning"]
     made.write_suite(tracks=tracks, steps={"physics": "off"}, **fields)
     made.out = made.root / "first"
-    assert made.run().code == 0
+    made.completed()
     made.write_suite(name="later", models=["random", "all-candidates"], seeds=[0, 1])
     made.out = made.root / "later"
-    assert made.run().code == 0
-    done = made.phyblock("bundle", "later", "--out", "later.zip")
-    assert done.code == 0, done.err
+    made.completed()
+    made.does("bundle", "later", "--out", "later.zip")
     return made
 
 
@@ -216,8 +213,7 @@ def site(runs: Workspace) -> Path:
     write_lines(folder / "records.jsonl", lines)
     data = ("--data", "data", "--data", "questions")
     named = ("--title", f"A site {NAME}", "--out", "site")
-    done = runs.phyblock("site", "hostile", "later.zip", *data, *named)
-    assert done.code == 0, done.err
+    done = runs.does("site", "hostile", "later.zip", *data, *named)
     assert "4 models and baselines, 58 samples" in done.out
     return runs.root / "site" / "index.html"
 

@@ -129,7 +129,7 @@ def test_a_report_is_replaced_as_a_whole(tmp_path):
 
 def test_scenes_are_drawn_from_where_they_are_and_from_no_other_data(workspace, tmp_path):
     workspace.write_suite(models=["oracle"])
-    assert workspace.run().code == 0
+    workspace.completed()
     out, data = workspace.out, workspace.root / "data"
     made = write_tables(out)
     report = Report(out, made=made)

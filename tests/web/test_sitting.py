@@ -41,8 +41,7 @@ def workspace(new_workspace):
     started.write_text('#!/bin/sh\necho "$1" > opened.new && mv opened.new opened\n')
     started.chmod(0o755)
     made.env["BROWSER"] = f"{started} %s"
-    done = made.run()
-    assert done.code == 0, done.err
+    made.completed()
     return made
 
 
@@ -123,10 +122,9 @@ def test_a_sitting_by_mouse_keys_and_phone_over_a_kill(browser, workspace):
         assert not sat.visit.complaints
     # It is scored as any model, and stands beside others.
     before = [{**one, "time": None} for one in answered(run)]
-    assert workspace.phyblock("score", run).code == 0
+    workspace.does("score", run)
     assert [{**one, "time": None} for one in answered(run)] == before
-    done = workspace.phyblock("compare", run, "out", "--models", "human:ada,oracle")
-    assert done.code == 0, done.err
+    workspace.does("compare", run, "out", "--models", "human:ada,oracle")
 
 
 def begin_with_mouse_and_keys(page, run):
