@@ -397,7 +397,7 @@ STAYS, IN_THE_WAY, TIPS, SLIDES = range(1, 5)
 off that; it tips what it is set on; it slides off a slope or a round back."""
 _PLACE_RING_M = 0.01
 """The verdict on a place holds all round it, this far off [m]."""
-_STRUCTURES_TRIED, _BLOCKS_TRIED, _POINTS, _AREA_M2 = 40, 12, 40, 0.0006
+_STRUCTURES_TRIED, _BLOCKS_TRIED, _POINTS, _AREA_M2 = 120, 12, 40, 0.0006
 _MOST_BLOCKS, _PILLARS_M = 10, (0.0, THIN_M, THIN_M, WIDE_M)
 _VIEWED_FROM_DEG, _VIEWS_OF_PLACES = (20, 34), 8
 _FLAT, _LOOKS_UP, _LOOKS_HERE, _ROUND_PX, _APART_M = 0.9999, 0.4, 0.2, 2, 0.025
@@ -411,13 +411,14 @@ class AffordanceMaker(Maker):
     """Kind: `ad-place`."""
 
     subtask: Subtask = "AD"
-    spare, doubtful = 2.0, 1.45
+    spare, doubtful = 2.0, 1.3
     drafts_a_scene = 3
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """Propose a block in a pose drawn, one place where it stays, and three where not."""
         for _ in range(self.drafts_a_scene):
-            tried = (_set_down(scene, rng) for _ in range(_STRUCTURES_TRIED))
+            rank = int(rng.integers(len(LETTERS)))
+            tried = (_set_down(scene, rank, rng) for _ in range(_STRUCTURES_TRIED))
             yield from itertools.islice(itertools.chain.from_iterable(tried), 1)
 
     def rederive(self, question: Question) -> tuple[int, ...]:
@@ -442,8 +443,11 @@ class AffordanceMaker(Maker):
         return base.only_index(stays)
 
 
-def _set_down(scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
-    """Yield a question about places on a part of the scene, with some blocks more, if some fit."""
+def _set_down(scene: Scene, rank: int, rng: np.random.Generator) -> Iterator[Draft]:
+    """Yield a question about places on a part of the scene, with some blocks more, if some fit.
+
+    So many of the wrong places are lower than the right one.
+    """
     blocks = _built_on(stage(scene, rng, _MOST_BLOCKS), sight.orders_of(scene.blocks), rng)
     points, last = points_of(blocks, rng), max(sight.orders_of(blocks))
     put = [_drawn_block(last + 1, rng) for _ in range(_BLOCKS_TRIED)]
@@ -452,7 +456,7 @@ def _set_down(scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         (block, outcome, *four)
         for block, outcome in zip(put, outcomes, strict=True)
         if STAYS in outcome and np.isin(outcome, (IN_THE_WAY, TIPS)).sum() > 1
-        for four in fours_of(blocks, points, outcome, rng)
+        for four in fours_of(blocks, points, outcome, rank, rng)
     ]
     if not found:
         return
@@ -596,10 +600,10 @@ def _out_m(at_m: Floats, low_m: Floats, high_m: Floats) -> Floats:
 
 
 def fours_of(
-    blocks: Sequence[Block], points: Points, outcomes: Ints, rng: np.random.Generator
+    blocks: Sequence[Block], points: Points, outcomes: Ints, rank: int, rng: np.random.Generator
 ) -> list[tuple[list[int], str, float]]:
-    """Return fours of points, the first of which is right, with kinds and odds; a four for each
-    three ranks that the right one can have, by height, by how far it is off the middle of its
+    """Return fours of points, the first of which is right and has the rank by height, with kinds
+    and odds; a four for each two ranks that it can have by how far it is off the middle of its
     block, and of the structure.
 
     Rare ranks have high odds.
@@ -616,9 +620,10 @@ def fours_of(
     # Points that are about equal come in an order drawn.
     drawn = [one + rng.random(len(one)) * 8 * SPARE_M for one in measures]
     ranks = np.array([ranks_of(one[fours]) for one in drawn]).T
-    fours, ranks = (one[ranks.min(axis=1) >= 0] for one in (fours, ranks))
+    is_fit = (ranks.min(axis=1) >= 0) & (ranks[:, 0] == rank)
+    fours, ranks = fours[is_fit], ranks[is_fit]
     kinds, first = np.unique(ranks, axis=0, return_index=True)
-    odds = (4 - kinds[:, 0]) ** 4.0 * (1 + kinds[:, 1]) ** 5.0 * (1 + kinds[:, 2]) ** 0.5
+    odds = (1 + kinds[:, 1]) ** 5.0 * (1 + kinds[:, 2]) ** 0.5
     told = [f"ranks {high} {off}" for high, off, _ in kinds]
     return list(zip(fours[first].tolist(), told, odds.tolist(), strict=True))
 
