@@ -10,8 +10,7 @@ one or two of the others the plank hangs over less; by how far all leans off the
 structure it is about as often any of the four.
 
 AD: what becomes of the block at each of four places is plain to the eye, and checked with margins.
-By height, and by how far the right one is off the middle of its block and of the structure, it is
-about as often any of the four.
+Its rank by height is drawn; still, the right one is too often near the middle of its face.
 """
 
 from __future__ import annotations
