@@ -616,8 +616,8 @@ def fours_of(
     middle = (boxes.min(axis=(0, 1)) + boxes.max(axis=(0, 1))) / 2
     offs = [points.at_m - center for center in (boxes.mean(axis=1)[points.on], middle)]
     measures = [points.at_m[:, 2], *(np.linalg.norm(off[:, :2], axis=1) for off in offs)]
-    # Points that are about equal come in an order drawn.
-    drawn = [one + rng.random(len(one)) * 8 * SPARE_M for one in measures]
+    # Points that are equal to a millimeter come in an order drawn.
+    drawn = [one + rng.random(len(one)) * 2 * SPARE_M for one in measures]
     ranks = np.array([ranks_of(one[fours]) for one in drawn]).T
     is_fit = (ranks.min(axis=1) >= 0) & (ranks[:, 0] == rank)
     fours, ranks = fours[is_fit], ranks[is_fit]
