@@ -128,7 +128,7 @@ def opened_bundle(path: Path, data: Sequence[Path] = ()) -> Iterator[Verified]:
 
     `data` are folders to look for its data in, besides the bundled sets. Raises StoreError if it is
     not a bundle, was changed, or is scored differently, and DataError if its data are not found.
-    Errors name files as if the bundle were a folder.
+    Errors, also those of the body, name files as if the bundle were a folder.
     """
     with tempfile.TemporaryDirectory(prefix="phyblock-") as scratch:
         folder = Path(scratch, path.name)

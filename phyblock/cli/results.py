@@ -352,7 +352,8 @@ def bundle(run: Path, out: Path | None) -> None:
 
     console = make_console()
     path = bundle_run(run, out)
-    console.print(f"{path.stat().st_size / 1000:,.0f} kB:")
+    size = path.stat().st_size
+    console.print(f"{size / _MB:.1f} MB:" if size >= _MB else f"{size / 1000:.0f} kB:")
     print_path(console, path)
 
 

@@ -167,10 +167,11 @@ def models(ctx: click.Context, models_file: str | None) -> None:
     from phyblock.models.costs import tariff_of
     from phyblock.models.keys import api_key_status
 
-    path = find_models_file(models_file, None)
-    known = ctx.obj = load_models(path)
     if ctx.invoked_subcommand is not None:
+        ctx.obj = models_file
         return
+    path = find_models_file(models_file, None)
+    known = load_models(path)
     console = make_console()
     groups: dict[str, Sequence[str]] = {"built in": baseline_names()}
     groups |= {
@@ -203,13 +204,12 @@ def _config(name: str, known: Mapping[str, ModelConfig]) -> ModelConfig:
 @models_file_option
 @yes_option
 @click.pass_obj
-def check(known: Mapping[str, ModelConfig], name: str, models_file: str | None, yes: bool) -> int:
+def check(of_group: str | None, name: str, models_file: str | None, yes: bool) -> int:
     """Make one tiny call to each server of the model NAME, and print the answer."""
-    if models_file is not None:
-        known = load_models(find_models_file(models_file, None))
     from phyblock.models.costs import is_billed
     from phyblock.models.litellm_client import be_quiet
 
+    known = load_models(find_models_file(models_file or of_group, None))
     names = [*baseline_names(), *known]
     if name not in names:
         hint = did_you_mean(name, names) or "list them: phyblock models"

@@ -40,6 +40,7 @@ from phyblock.sim.dynamics import (
     ExecutedStep,
     Executor,
     Settled,
+    execution_physics,
     settle,
 )
 from phyblock.sim.geometry import center_cm, put
@@ -184,7 +185,9 @@ class _PosePlay:
             self._task, self._scene, self.candidates = task, task.scene, task.candidates
             self._floor: RuledFloor | None = None
         self._stack.close()
-        self._executor = self._stack.enter_context(Executor())
+        self._executor = self._stack.enter_context(
+            Executor(physics=execution_physics(self._scene.blocks))
+        )
         self._last: ExecutedStep | None = None
         self._named: list[int] = []
         self._reached = 0

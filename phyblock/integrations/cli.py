@@ -59,14 +59,10 @@ def export(
 
     if (run is not None) + scenes + (questions is not None) > 1:
         raise click.UsageError("Name the folder of a run, --scenes or --questions.")
+    if run is None and not scenes and questions is None and form != "lmms-eval":
+        raise click.UsageError("Name the folder of a run, --scenes or --questions.")
     if run is None and out is None:
-        of_run = form in _OF_RUN and not scenes and questions is None
-        missing = (
-            "RUN is missing: the folder of a run"
-            if of_run
-            else "--out is missing: the folder to write"
-        )
-        raise click.UsageError(f"{missing}.")
+        raise click.UsageError("--out is missing: the folder to write.")
     of_others = _OF_QUESTIONS if questions else ("lmms-eval",)
     forms = _OF_RUN if run else _OF_SCENES if scenes else of_others
     if form not in forms:

@@ -41,7 +41,7 @@ from phyblock.scoring.pose_matching import TOLERANCES_CM
 from phyblock.sim.balance import is_balanced, surely_stands
 from phyblock.sim.camera import VIEWS
 from phyblock.sim.contact import voxel_iou
-from phyblock.sim.dynamics import ExecutionLimits, execute, groups
+from phyblock.sim.dynamics import ExecutionLimits, execute, execution_physics, groups
 from phyblock.sim.engine import Pose, described_engine
 from phyblock.sim.film import FilmStep, Tone
 from phyblock.sim.geometry import box_height_cm, center_cm, collision_pieces, origin_m, put
@@ -55,7 +55,7 @@ from phyblock.tracks.picking import NumberField, Pick, Picking, candidate_choice
 from phyblock.tracks.pictures import Drawing, picture_style
 from phyblock.types import STEP_ENDS, Matcher, Setting, StepEnd, View
 
-CARRY_VERSION = 3
+CARRY_VERSION = 4
 """Version of plan execution and its measurements; increased when the end of a plan may change."""
 KIT_LABEL = "blocks"
 """The label of the sheet of candidates."""
@@ -274,7 +274,7 @@ def _ended_before(record: PoseRecord | None, given: Sequence[PoseStep]) -> Ended
 def _carried(scene: Scene, blocks: Sequence[Block | None]) -> Ended:
     # An engine executes one plan at a time, for all threads.
     with _ONE_AT_A_TIME:
-        done = execute(blocks)
+        done = execute(blocks, physics=execution_physics(scene.blocks))
     goal, reached = scene.blocks, blocks_reached(scene.blocks, done.blocks, *_REACHED.values())
     lies = {n: Pose.goal(block) for n, block in enumerate(blocks, 1) if block is not None}
     steps = []

@@ -454,7 +454,7 @@ FOLDERS = (
     Bad("manifest-data", manifest_without("dataset", "score", "out"), ("out/run.yaml", "dataset")),
     Bad("show-none", command("show", "out", "no-such"), ("no-such", "holds no such sample")),
     Bad("show-like", command("show", "out", "ramdon/t1"), ("did you mean random?",)),
-    Bad("export-nothing", command("export", "--to", "csv"), ("RUN is missing",)),
+    Bad("export-nothing", command("export", "--to", "csv"), ("Name the folder of a run",)),
     Bad("show-several", command("show", "out", "random"), ("holds 5 such samples", "allowed: ")),
     Bad("no-run", command("report", "data"), ("data: holds no run.yaml",)),
     Bad("nothing", command("report", "nowhere"), ("nowhere", "phyblock run")),

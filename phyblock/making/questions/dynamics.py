@@ -10,7 +10,8 @@ one or two of the others the plank hangs over less; by how far all leans off the
 structure it is about as often any of the four.
 
 AD: what becomes of the block at each of four places is plain to the eye, and checked with margins.
-Its rank by height is drawn; still, the right one is too often near the middle of its face.
+The rank of the right place by height is drawn; it is still too often the one nearest to the middle
+of its face.
 """
 
 from __future__ import annotations
@@ -394,8 +395,8 @@ Place = tuple[float, float, float]
 STAYS, IN_THE_WAY, TIPS, SLIDES = range(1, 5)
 """What happens to a block that is set down: it stays; it comes down on a neighbor first, and tips
 off that; it tips what it is set on; it slides off a slope or a round back."""
-_PLACE_RING_M = 0.01
-"""The verdict on a place holds all round it, this far off [m]."""
+_PLACE_RING_M, _WIDE_RING_M = 0.005, 0.01
+"""The verdict on a place holds all round it, this far off; in proposals farther [m]."""
 _STRUCTURES_TRIED, _BLOCKS_TRIED, _POINTS, _AREA_M2 = 120, 12, 40, 0.0006
 _MOST_BLOCKS, _PILLARS_M = 10, (0.0, THIN_M, THIN_M, WIDE_M)
 _VIEWED_FROM_DEG, _VIEWS_OF_PLACES = (20, 34), 8
@@ -443,9 +444,9 @@ class AffordanceMaker(Maker):
 
 
 def _set_down(scene: Scene, rank: int, rng: np.random.Generator) -> Iterator[Draft]:
-    """Yield a question about places on a part of the scene, with some blocks more, if some fit.
+    """Yield at most one question about places on part of the scene, with a few blocks added.
 
-    So many of the wrong places are lower than the right one.
+    Of the three wrong places, `rank` are lower than the right one.
     """
     blocks = _built_on(stage(scene, rng, _MOST_BLOCKS), sight.orders_of(scene.blocks), rng)
     points, last = points_of(blocks, rng), max(sight.orders_of(blocks))
@@ -466,7 +467,7 @@ def _set_down(scene: Scene, rank: int, rng: np.random.Generator) -> Iterator[Dra
     if not all(map(surely_stands, groups(blocks))):
         return
     for place, stays in zip(places, _ONE_STAYS, strict=True):
-        if stays_round(lowered(block, blocks, *place[:2]), blocks, _PLACE_RING_M) is not stays:
+        if stays_round(lowered(block, blocks, *place[:2]), blocks, _WIDE_RING_M) is not stays:
             return
     told = [blocks[k] for k in chosen.on[np.isin(outcome[four], (STAYS, TIPS))]]
     marks = tuple(Mark("A", place) for place in places)
@@ -538,9 +539,10 @@ def points_of(blocks: Sequence[Block], rng: np.random.Generator) -> Points:
 def outcomes_of(blocks: tuple[Block, ...], block: Block, points: Points) -> Ints:
     """Return what plainly happens to a block set down at each point; 0 where that is not plain.
 
-    Plain is what a person tells by eye: the block comes no closer to a higher one than 1.5 cm, or
-    meets it by as much; what it is set on has its supports below the point, or on both sides of
-    it, or bears nothing else and ends clearly before.
+    A person can tell by eye that the block keeps 1.25 cm from higher blocks beside the one it is
+    set on, and 2.5 cm from all others, or overlaps one by as much; and that what it is set on has
+    supports under the point, or on both sides of it, or bears nothing else and ends at least
+    1.5 cm before the point.
     """
     boxes = np.array([bounds_m(one) for one in blocks])
     (low, high), top, at = (boxes[:, i, :2] for i in (0, 1)), boxes[:, 1, 2], points.at_m[:, None]
@@ -616,7 +618,7 @@ def fours_of(
     middle = (boxes.min(axis=(0, 1)) + boxes.max(axis=(0, 1))) / 2
     offs = [points.at_m - center for center in (boxes.mean(axis=1)[points.on], middle)]
     measures = [points.at_m[:, 2], *(np.linalg.norm(off[:, :2], axis=1) for off in offs)]
-    # Points that are equal to a millimeter come in an order drawn.
+    # Points less than half a millimeter apart come in an order drawn.
     drawn = [one + rng.random(len(one)) * 2 * SPARE_M for one in measures]
     ranks = np.array([ranks_of(one[fours]) for one in drawn]).T
     is_fit = (ranks.min(axis=1) >= 0) & (ranks[:, 0] == rank)
