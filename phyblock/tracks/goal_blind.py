@@ -69,11 +69,9 @@ AREA_KEYS: tuple[Key, ...] = (
 
 def units(candidates: CandidateSet, setting: Setting, areas: Areas | None = None) -> list[Unit]:
     """Return the units of a candidate set under a setting, by their numbers."""
-    made, by_kind = [], defaultdict[Any, list[int]](list)
-    for number, one in enumerate(candidates.candidates, 1):
-        by_kind[one.kind].append(number)
-    for number, one in enumerate(candidates.candidates, 1):
-        same = tuple(by_kind[one.kind])
+    listed, made = list(enumerate(candidates.candidates, 1)), []
+    for number, one in listed:
+        same = tuple(n for n, other in listed if other.kind == one.kind)
         rank = same.index(number)
         if setting == "A" or rank == 0:
             numbers, area = (number,) if setting == "A" else same, (areas or {}).get(one.color, 0.0)

@@ -9,9 +9,8 @@ PD: four pictures show the same blocks laid on an unfinished structure, of which
 one or two of the others the plank hangs over less; by how far all leans off the middle of the
 structure it is about as often any of the four.
 
-AD: what becomes of the block at each of four places is plain to the eye, and checked with margins.
-The rank of the right place by height is drawn; it is still too often the one nearest to the middle
-of its face.
+AD: all places are on two planks in balance. By how far the right one is off the middle of its
+plank, and of the structure, it is about as often any of the four.
 """
 
 from __future__ import annotations
@@ -41,6 +40,7 @@ from phyblock.making.questions.base import Draft, Floats, Maker, UnfairError, Vi
 from phyblock.making.questions.structures import (
     SPARE_M,
     THIN_M,
+    UNIT_M,
     WIDE_M,
     Bench,
     bench,
@@ -55,11 +55,11 @@ from phyblock.making.questions.structures import (
     verdict,
 )
 from phyblock.making.scenes.sketch import POSES
-from phyblock.sim.balance import MARGIN_M, is_balanced, surely_stands
+from phyblock.sim.balance import is_balanced, surely_stands
 from phyblock.sim.camera import view_axes
-from phyblock.sim.contact import GROUND, bounds_m, support_graph
+from phyblock.sim.contact import bounds_m, support_graph
 from phyblock.sim.dynamics import groups
-from phyblock.sim.geometry import cross, drawn_mesh
+from phyblock.sim.geometry import drawn_mesh
 from phyblock.sim.outcomes import LEAN_DEG, Outcome, after_removal
 from phyblock.sim.pictures import drawn_m
 from phyblock.sim.question_pictures import (
@@ -392,18 +392,10 @@ def _can_follow(shown: QuestionPicture, option: QuestionPicture) -> bool:
 
 Place = tuple[float, float, float]
 """A point of the world [m]."""
-STAYS, IN_THE_WAY, TIPS, SLIDES = range(1, 5)
-"""What happens to a block that is set down: it stays; it comes down on a neighbor first, and tips
-off that; it tips what it is set on; it slides off a slope or a round back."""
-_PLACE_RING_M, _WIDE_RING_M = 0.005, 0.01
-"""The verdict on a place holds all round it, this far off; in proposals farther [m]."""
-_STRUCTURES_TRIED, _BLOCKS_TRIED, _POINTS, _AREA_M2 = 120, 12, 40, 0.0006
-_MOST_BLOCKS, _PILLARS_M = 10, (0.0, THIN_M, THIN_M, WIDE_M)
-_VIEWED_FROM_DEG, _VIEWS_OF_PLACES = (20, 34), 8
-_FLAT, _LOOKS_UP, _LOOKS_HERE, _ROUND_PX, _APART_M = 0.9999, 0.4, 0.2, 2, 0.025
-_INSIDE_M, _CLEAR_M, _CLEAR_OF_OTHERS_M, _BESIDE_M = 0.015, 0.0125, 0.025, 0.001
-_OVER_M, _OUT_M, _LEANS_OUT_M, _OFF_CONTACT_M = 0.005, 0.015, 0.0075, 0.01
-_SMALL_M, _ODDS_OF_SMALL, _OFF_CENTER_M, _MOST_OF_A_FACE = 0.08, 0.35, 0.001, 0.8
+_PLACE_RING_M = 0.005
+"""The verdict on a place holds all round it, this far off [m]."""
+_STRUCTURES_TRIED, _LEAST_APART_M, _ROUND_PX, _CLEAR_M = 80, 0.025, 2, 0.006
+_OFF_CENTER_M, _MOST_OF_A_FACE = 0.001, 0.8
 _SAME_HEIGHT_M, _CLEARLY_HIGHER_M = 0.001, 0.01
 
 
@@ -411,14 +403,14 @@ class AffordanceMaker(Maker):
     """Kind: `ad-place`."""
 
     subtask: Subtask = "AD"
-    spare, doubtful = 2.0, 1.3
-    drafts_a_scene = 3
+    spare, doubtful = 2.5, 2.0
+    drafts_a_scene = 8
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """Propose a block in a pose drawn, one place where it stays, and three where not."""
         for _ in range(self.drafts_a_scene):
-            rank = int(rng.integers(len(LETTERS)))
-            tried = (_set_down(scene, rank, rng) for _ in range(_STRUCTURES_TRIED))
+            ranks = (int(rng.integers(len(LETTERS))), int(rng.integers(len(LETTERS))))
+            tried = (_set_down(scene, ranks, rng) for _ in range(_STRUCTURES_TRIED))
             yield from itertools.islice(itertools.chain.from_iterable(tried), 1)
 
     def rederive(self, question: Question) -> tuple[int, ...]:
@@ -443,238 +435,137 @@ class AffordanceMaker(Maker):
         return base.only_index(stays)
 
 
-def _set_down(scene: Scene, rank: int, rng: np.random.Generator) -> Iterator[Draft]:
-    """Yield at most one question about places on part of the scene, with a few blocks added.
-
-    Of the three wrong places, `rank` are lower than the right one.
-    """
-    blocks = _built_on(stage(scene, rng, _MOST_BLOCKS), sight.orders_of(scene.blocks), rng)
-    points, last = points_of(blocks, rng), max(sight.orders_of(blocks))
-    put = [_drawn_block(last + 1, rng) for _ in range(_BLOCKS_TRIED)]
-    outcomes = [outcomes_of(blocks, block, points) for block in put]
-    found = [
-        (block, outcome, *four)
-        for block, outcome in zip(put, outcomes, strict=True)
-        if STAYS in outcome and np.isin(outcome, (IN_THE_WAY, TIPS)).sum() > 1
-        for four in fours_of(blocks, points, outcome, rank, rng)
-    ]
-    if not found:
-        return
-    odds = np.array([one[-1] for one in found])
-    block, outcome, four, kind, _ = found[rng.choice(len(found), p=odds / odds.sum())]
-    chosen = points.those(four)
-    places = [(x, y, z) for x, y, z in chosen.at_m.tolist()]
-    if not all(map(surely_stands, groups(blocks))):
-        return
-    for place, stays in zip(places, _ONE_STAYS, strict=True):
-        if stays_round(lowered(block, blocks, *place[:2]), blocks, _WIDE_RING_M) is not stays:
+def _set_down(scene: Scene, ranks: Ranks, rng: np.random.Generator) -> Iterator[Draft]:
+    """Yield a question about places on two planks on the scene, as far as some fit."""
+    blocks, view = stage(scene, rng), base.drawn_view(rng)
+    block = _drawn_block(0, view, rng)
+    spots: list[Spot] = []
+    tops = free_tops(blocks)
+    for top in shuffled(rng, tops)[:2] if len(tops) > 1 else ():
+        first = max(sight.orders_of((*scene.blocks, *blocks))) + 1
+        on = bench(blocks, top, int(rng.integers(2)), pick(rng, (THIN_M, WIDE_M)), first, rng)
+        plans = on.plans_m(_PLANS, rng)
+        plans = plans[np.abs(on.leans_m(plans)) <= on.limits_m[0]]
+        # Planks that hang over far have more places where a block stays off their middle.
+        plans = plans[np.abs(plans[:, 0]).argsort(kind="stable")][len(plans) * 2 // 3 :]
+        laid = on.laid(pick(rng, plans.tolist())) if len(plans) else None
+        if laid is None:
             return
-    told = [blocks[k] for k in chosen.on[np.isin(outcome[four], (STAYS, TIPS))]]
-    marks = tuple(Mark("A", place) for place in places)
-    for _ in range(_VIEWS_OF_PLACES):
-        plain = QuestionPicture("scene", blocks, base.drawn_view(rng, _VIEWED_FROM_DEG))
-        if shows_solid(block, plain.view_deg) and _are_shown(plain, marks, chosen, told):
-            shown = (plain, QuestionPicture(BLOCK_LABEL, (block,), plain.view_deg))
-            facts = {"block": block.type, "euler": list(block.euler_deg)}
-            yield Draft(scene, "ad-place", marks, shown, {"size": _size(block)}, facts, kind)
-            return
+        spots += free_spots(on, laid, block)
+        blocks = laid
+    four = four_spots(spots, blocks, view, ranks, rng)
+    plain = QuestionPicture("scene", blocks, view)
+    marks = [Mark("A", spot.place) for spot in four]
+    if not marks or not _are_shown(plain, marks):
+        return
+    block = replace(block, order=max(sight.orders_of(blocks)) + 1)
+    puts = [lowered(block, blocks, *spot.place[:2]) for spot in four]
+    if (
+        all(is_on_face(plain, put, spot.place) for put, spot in zip(puts, four, strict=True))
+        and all(map(surely_stands, groups(blocks)))
+        and [surely_stays((*blocks, put), put.order) for put in puts] == _ONE_STAYS
+        and stays_leaning((*blocks, puts[0]), block.order)
+    ):
+        shown = (plain, QuestionPicture(BLOCK_LABEL, (block,), view))
+        facts = {"block": block.type, "euler": list(block.euler_deg)}
+        slots, kind = {"size": _size(block)}, f"ranks {ranks}"
+        yield Draft(scene, "ad-place", tuple(marks), shown, slots, facts, kind)
 
 
-def _built_on(
-    blocks: tuple[Block, ...], taken: Sequence[int], rng: np.random.Generator
-) -> tuple[Block, ...]:
-    """Return blocks with up to two planks laid on them, most on pillars, and small blocks set down
-    where they plainly stay.
+class Spot(NamedTuple):
+    """A point on the plank of a bench, and how far it is off the middle of the plank.
+
+    By a lever a block put there stays, or falls, or neither is sure.
     """
-    order = max(taken) + 1
-    for top in shuffled(rng, free_tops(blocks))[: int(rng.integers(3))]:
-        on = bench(blocks, top, 0, pick(rng, _PILLARS_M), order, rng)
-        plans = on.plans_m(_POINTS, rng)
-        plans = plans[np.abs(on.leans_m(plans)) <= on.limits_m[0] - MARGIN_M / 2]
-        laid = on.laid(plans[np.abs(plans[:, 0]).argmax()].tolist()) if len(plans) else None
-        blocks, order = laid or blocks, order + 2
-    for _ in range(int(rng.integers(2, 5))):
-        block = _drawn_block(order, rng, is_small=True)
-        points = points_of(blocks, rng)
-        where = points.at_m[outcomes_of(blocks, block, points) == STAYS].tolist()
-        if where:
-            blocks, order = (*blocks, lowered(block, blocks, *pick(rng, where)[:2])), order + 1
-    return blocks
+
+    place: Place
+    off_center_m: float
+    stays: bool
+    falls: bool
 
 
-class Points(NamedTuple):
-    """Points [m], (n, 3), the index of the block that each is on, and normals of their faces."""
-
-    at_m: Floats
-    on: Ints
-    normals: Floats
-
-    def those(self, chosen: Sequence[int]) -> Points:
-        """Return some of the points."""
-        return Points(self.at_m[chosen], self.on[chosen], self.normals[chosen])
-
-
-def points_of(blocks: Sequence[Block], rng: np.random.Generator) -> Points:
-    """Return points drawn on all faces that look up, on flat tops well inside."""
-    found = [Points(np.empty((0, 3)), np.empty(0, dtype=np.int64), np.empty((0, 3)))]
-    for i, block in enumerate(blocks):
-        corners = drawn_m(block)[drawn_mesh(block.type).triangles]
-        normals = cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        areas = np.linalg.norm(normals, axis=1)
-        normals /= areas[:, None]
-        is_up = normals[:, 2] > (_FLAT if block.type == "arch" else _LOOKS_UP)
-        if not is_up.any():
-            continue
-        faces = rng.choice(np.flatnonzero(is_up), size=_POINTS, p=areas[is_up] / areas[is_up].sum())
-        parts = rng.dirichlet((1, 1, 1), size=_POINTS)
-        at_m = np.einsum("pk,pkc->pc", parts, corners[faces]).round(4)
-        low, high = bounds_m(block)
-        is_inside = np.minimum(at_m - low, high - at_m)[:, :2].min(axis=1) >= _INSIDE_M
-        kept = np.flatnonzero(is_inside | (normals[faces, 2] <= _FLAT))
-        kept = kept[: math.ceil(areas[is_up].sum() / _AREA_M2)]
-        found.append(Points(at_m[kept], np.full(len(kept), i), normals[faces[kept]]))
-    return Points(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+def free_spots(on: Bench, laid: Sequence[Block], block: Block) -> Iterator[Spot]:
+    """Yield spots on the plank, as it was laid, where a block has room beside the weights."""
+    (near, far), mass_kg = on.limits_m, SHAPES[block.type].mass_kg
+    boxes = [bounds_m(one) for one in laid[len(on.base) :]]
+    offs_m = np.array([box.mean(axis=0) for box in boxes]) - bounds_m(on.top).mean(axis=0)
+    offs_m, middle = offs_m[:, on.along], [*boxes[0].mean(axis=0)[:2], boxes[0][1, 2]]
+    room_m = (on.lengths_m[1:] + np.ptp(bounds_m(block)[:, on.along])) / 2 + _CLEAR_M
+    most = round(float(on.lengths_m[0]) / UNIT_M / 2) - 1
+    for step, aside in itertools.product(range(-most, most + 1), (-1, 0, 1)):
+        off_m = offs_m[0] + step * UNIT_M
+        if (np.abs(offs_m[1:] - off_m) >= room_m).all():
+            lean_m = abs(offs_m @ on.masses_kg + mass_kg * off_m) / (on.masses_kg.sum() + mass_kg)
+            at = np.array(middle)
+            at[[on.along, 1 - on.along]] += (step * UNIT_M, aside * UNIT_M)
+            x, y, z = np.round(at, 6).tolist()
+            off_center_m = math.hypot(step, aside) * UNIT_M
+            yield Spot((x, y, z), off_center_m, bool(lean_m <= near), bool(lean_m >= far))
 
 
-def outcomes_of(blocks: tuple[Block, ...], block: Block, points: Points) -> Ints:
-    """Return what plainly happens to a block set down at each point; 0 where that is not plain.
+def four_spots(
+    spots: Sequence[Spot],
+    blocks: Sequence[Block],
+    view: View,
+    ranks: Ranks,
+    rng: np.random.Generator,
+) -> list[Spot]:
+    """Return four spots, apart as they are seen, of which a block stays on the first only; empty
+    where there are no such.
 
-    A person can tell by eye that the block keeps 1.25 cm from higher blocks beside the one it is
-    set on, and 2.5 cm from all others, or overlaps one by as much; and that what it is set on has
-    supports under the point, or on both sides of it, or bears nothing else and ends at least
-    1.5 cm before the point.
+    Its ranks are by how far it is off the middle of its plank, and of the structure.
     """
-    boxes = np.array([bounds_m(one) for one in blocks])
-    (low, high), top, at = (boxes[:, i, :2] for i in (0, 1)), boxes[:, 1, 2], points.at_m[:, None]
-    half = np.ptp(bounds_m(block), axis=0)[:2] / 2
-    is_higher = top > at[..., 2] + _SAME_HEIGHT_M
-    is_higher[np.arange(len(points.on)), points.on] = False
-
-    def met(reach_m: Floats | float) -> NDArray[np.bool_]:
-        """Blocks that are higher than a point and so near to it, (points, blocks)."""
-        near = (low < at[..., :2] + reach_m) & (high > at[..., :2] - reach_m)
-        return np.asarray(is_higher & near.all(axis=2))
-
-    gaps = np.maximum(boxes[:, None, 0] - boxes[:, 1], boxes[:, 0] - boxes[:, None, 1])
-    is_beside = (gaps.max(axis=2) <= _BESIDE_M)[points.on]
-    is_near = met(half + _CLEAR_M) | (met(half + _CLEAR_OF_OTHERS_M) & ~is_beside)
-    is_open, is_clear = ~met(0.0).any(axis=1), ~is_near.any(axis=1)
-    # What it comes down on first, if anything is in the way.
-    on = met(half)
-    on &= top > np.where(on, top, 0.0).max(axis=1, keepdims=True) - _SAME_HEIGHT_M
-    first = np.where(on[..., None], np.maximum(low, at[..., :2] - half), np.inf).min(axis=1)
-    last = np.where(on[..., None], np.minimum(high, at[..., :2] + half), -np.inf).max(axis=1)
-    is_met = met(half - _CLEAR_OF_OTHERS_M) | (met(half - _CLEAR_M) & is_beside)
-    is_met &= top > at[..., 2] + _CLEARLY_HIGHER_M
-    is_blocked = is_met.any(axis=1) & (_out_m(at[:, 0], first, last) >= _OFF_CONTACT_M)
-    # Whether what it is set on holds.
-    below, xy = _below(blocks), points.at_m[:, :2]
-    borne = np.array([_borne_by(one, blocks, below) for one in blocks])[points.on]
-    masses = np.array([SHAPES[one.type].mass_kg for one in (block, *blocks)])
-    share = (masses[0] / (masses[0] + masses[1:]))[points.on, None]
-    leans = share * xy + (1 - share) * boxes.mean(axis=1)[points.on, :2]
-    is_loaded = np.array([any(one.order in under for under in below.values()) for one in blocks])
-    tips = (_out_m(xy, *borne.swapaxes(0, 1)) >= _OUT_M) & ~is_loaded[points.on]
-    tips &= _out_m(leans, *borne.swapaxes(0, 1)) >= _LEANS_OUT_M
-    is_held = _out_m(xy, *borne.swapaxes(0, 1)) <= -_OVER_M
-    free, flat = is_open & is_clear, points.normals[:, 2] > _FLAT
-    cases = [is_open & is_blocked & flat, free & ~flat, free & is_held, free & tips]
-    return np.select(cases, [IN_THE_WAY, SLIDES, STAYS, TIPS], 0)
-
-
-def _borne_by(block: Block, blocks: Sequence[Block], below: sight.Below) -> Floats:
-    """Return the corners (2, 2) of the box round what bears a block, seen from above [m]."""
-    low, high = bounds_m(block)[:, :2]
-    under = [bounds_m(one)[:, :2] for one in blocks if one.order in below[block.order]]
-    if GROUND in below[block.order] or not under:
-        return np.array([low, high])
-    corners = np.array(under)
-    return np.array(
-        [np.maximum(low, corners[:, 0].min(axis=0)), np.minimum(high, corners[:, 1].max(axis=0))]
-    )
-
-
-def _out_m(at_m: Floats, low_m: Floats, high_m: Floats) -> Floats:
-    """Return how far points are outside of boxes seen from above, below 0 inside [m]."""
-    outside: Floats = np.maximum(low_m - at_m[:, :2], at_m[:, :2] - high_m).max(axis=1)
-    return outside
-
-
-def fours_of(
-    blocks: Sequence[Block], points: Points, outcomes: Ints, rank: int, rng: np.random.Generator
-) -> list[tuple[list[int], str, float]]:
-    """Return fours of points, the first of which is right and has the rank by height, with kinds
-    and odds; a four for each two ranks that it can have by how far it is off the middle of its
-    block, and of the structure.
-
-    Rare ranks have high odds.
-    """
-    fours = one_stays(outcomes == STAYS, outcomes > STAYS, rng)
-    apart_m = np.linalg.norm(points.at_m[:, None] - points.at_m, axis=2)
+    stays, falls = (np.array([spot[i] for spot in spots], dtype=bool) for i in (2, 3))
+    fours = one_stays(stays, falls, rng)
+    if not len(fours):
+        return []
+    places_m = np.array([spot.place for spot in spots])
+    seen_m = places_m @ np.array(view_axes(*view)[:2]).T
+    apart_m = np.linalg.norm(seen_m[:, None] - seen_m, axis=2)
     for i, j in itertools.combinations(range(len(LETTERS)), 2):
-        fours = fours[apart_m[fours[:, i], fours[:, j]] >= _APART_M]
-    fours = fours[(outcomes[fours] == SLIDES).sum(axis=1) <= 1]
-    boxes = np.array([bounds_m(block) for block in blocks])
-    middle = (boxes.min(axis=(0, 1)) + boxes.max(axis=(0, 1))) / 2
-    offs = [points.at_m - center for center in (boxes.mean(axis=1)[points.on], middle)]
-    measures = [points.at_m[:, 2], *(np.linalg.norm(off[:, :2], axis=1) for off in offs)]
-    # Points less than half a millimeter apart come in an order drawn.
-    drawn = [one + rng.random(len(one)) * 2 * SPARE_M for one in measures]
-    ranks = np.array([ranks_of(one[fours]) for one in drawn]).T
-    is_fit = (ranks.min(axis=1) >= 0) & (ranks[:, 0] == rank)
-    fours, ranks = fours[is_fit], ranks[is_fit]
-    kinds, first = np.unique(ranks, axis=0, return_index=True)
-    odds = (1 + kinds[:, 1]) ** 5.0 * (1 + kinds[:, 2]) ** 0.5
-    told = [f"ranks {high} {off}" for high, off, _ in kinds]
-    return list(zip(fours[first].tolist(), told, odds.tolist(), strict=True))
+        fours = fours[apart_m[fours[:, i], fours[:, j]] >= _LEAST_APART_M]
+    corners = np.concatenate([bounds_m(block) for block in blocks])
+    middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
+    out_m = np.linalg.norm((places_m - middle)[:, :2], axis=1)
+    off_m = np.array([spot.off_center_m for spot in spots])
+    fitting = (ranks_of(off_m[fours]) == ranks[0]) & (ranks_of(out_m[fours]) == ranks[1])
+    return [spots[i] for i in pick(rng, fours[fitting].tolist())] if fitting.any() else []
 
 
-def _are_shown(
-    plain: QuestionPicture, marks: tuple[Mark, ...], points: Points, told: Sequence[Block]
-) -> bool:
-    """True if all blocks and marks show, and well so what some of the blocks rest on."""
-    if (points.normals @ view_axes(*plain.view_deg)[2]).max() > -_LOOKS_HERE:
+def _are_shown(plain: QuestionPicture, marks: Sequence[Mark]) -> bool:
+    """True if all blocks show, and each mark is well inside of one, apart from the others."""
+    if not is_inside(replace(plain, marks=tuple(marks))) or not are_apart(plain, marks):
         return False
-    if not is_inside(replace(plain, marks=marks)) or not are_apart(plain, marks):
-        return False
-    for mark, on in zip(marks, points.on, strict=True):
+    for mark in marks:
         row, column = mark_pixel(plain, mark.position_m)
         rows, columns = (slice(at - _ROUND_PX, at + _ROUND_PX + 1) for at in (row, column))
-        if (seen(plain).block[rows, columns] != on).any():
+        near = seen(plain).block[rows, columns]
+        if near.min() < 0 or near.min() < near.max():
             return False
-    below = _below(plain.blocks)
-    under = frozenset[int]().union(*(below[block.order] for block in told)) - {GROUND}
-    deep = frozenset[int]().union(*(sight.all_below(block.order, below) for block in told))
-    return (
-        sight.are_seen(plain, sight.orders_of(plain.blocks), _ALL_SEEN)
-        and sight.are_seen(plain, under, sight.NAMED)
-        and sight.are_seen(plain, deep, sight.COUNTED)
-    )
+    return sight.are_seen(plain, sight.orders_of(plain.blocks), _ALL_SEEN)
 
 
-def _drawn_block(order: int, rng: np.random.Generator, is_small: bool = False) -> Block:
-    """Return a block to put down; more often a large one than not."""
-    small, large = _balanced_poses()
-    poses = small if is_small or rng.random() < _ODDS_OF_SMALL else large
-    block_type, euler = pick(rng, poses)
-    return Block(order, block_type, pick(rng, COLORS), (0.0, 0.0, 0.0), euler, (), 1)
+def _drawn_block(order: int, view: View, rng: np.random.Generator) -> Block:
+    """Return a block to put down, in a pose whose shape the view shows."""
+    while True:
+        block_type, euler = pick(rng, _balanced_poses())
+        block = Block(order, block_type, pick(rng, COLORS), (0.0, 0.0, 0.0), euler, (), 1)
+        if shows_solid(block, view):
+            return block
 
 
 @functools.cache
-def _balanced_poses() -> tuple[list[tuple[BlockType, Euler]], ...]:
-    """Return poses of small and of large blocks that stand, with the center of mass under the
-    middle seen from above. An arch has a gap there.
-    """
-    small, large = list[tuple[BlockType, Euler]](), list[tuple[BlockType, Euler]]()
+def _balanced_poses() -> list[tuple[BlockType, Euler]]:
+    """Return poses that stand, with the center of mass under the middle seen from above."""
+    poses = []
     for block_type in BLOCK_TYPES:
-        for euler in POSES[block_type].values() if block_type != "arch" else ():
+        for euler in POSES[block_type].values():
             block = lowered(Block(1, block_type, "red", (0.0, 0.0, 0.0), euler, (), 1), (), 0, 0)
             center = euler_deg_to_matrix(euler) @ np.array(SHAPES[block_type].center_of_mass_m)
             is_central = np.abs(center[:2] + block.position_m[:2]).max() < _OFF_CENTER_M
             if is_central and surely_stands((block,)):
-                is_small = np.ptp(bounds_m(block), axis=0)[:2].max() < _SMALL_M
-                (small if is_small else large).append((block_type, euler))
-    return small, large
+                poses.append((block_type, euler))
+    return poses
 
 
 def shows_solid(block: Block, view: View) -> bool:
@@ -697,14 +588,38 @@ def _size(block: Block) -> str:
 
 @functools.lru_cache(maxsize=64)
 def stays_at(plain: QuestionPicture, block: Block, at: Place) -> bool | None:
-    """True if the block stays at a place, by simulation too, and likewise up to 1 cm off.
+    """True if the block stays at a place, by simulation too, and likewise up to 5 mm off.
 
-    None where that is not sure, and where it stays on something else than what is marked.
+    None where that is not sure, where it is not sure on which face it comes down, and where it
+    stays on another than the one that is marked.
     """
     put = lowered(block, plain.blocks, *at[:2])
-    stays = stays_round(put, plain.blocks, _PLACE_RING_M)
-    if verdict((*plain.blocks, put), put.order) is not stays:
+    around = lowered_round(put, plain.blocks, _PLACE_RING_M)
+    is_on = is_on_face(plain, put, at)
+    if is_on is None or any(_is_as_high(one, at) is not is_on for one in around):
         return None
-    around = (put, *lowered_round(put, plain.blocks, _PLACE_RING_M))
-    heights_m = [abs(float(bounds_m(one)[0, 2]) - at[2]) for one in around]
-    return None if stays and max(heights_m) > _SAME_HEIGHT_M else stays
+    stays = stays_round(put, plain.blocks, _PLACE_RING_M)
+    if verdict((*plain.blocks, put), put.order) is not stays or (stays and not is_on):
+        return None
+    return stays
+
+
+def is_on_face(plain: QuestionPicture, put: Block, at: Place) -> bool | None:
+    """True if a block let down at a place came down on the marked face, as without others.
+
+    False if it met a neighbor clearly before; None where neither is so.
+    """
+    is_as_high = _is_as_high(put, at)
+    if not is_as_high:
+        return is_as_high
+    under = seen_order(plain, seen(plain), at)
+    alone = [one for one in plain.blocks if one.order == under]
+    return True if _is_as_high(lowered(put, alone, *at[:2]), at) else None
+
+
+def _is_as_high(put: Block, at: Place) -> bool | None:
+    """True if a block has come down as far as a place; None where it is lower, or hardly higher."""
+    above_m = float(bounds_m(put)[0, 2]) - at[2]
+    if abs(above_m) < _SAME_HEIGHT_M:
+        return True
+    return False if above_m > _CLEARLY_HIGHER_M else None

@@ -98,13 +98,10 @@ class Bench(NamedTuple):
         return leans
 
 
-def stage(scene: Scene, rng: np.random.Generator, most: int = 0) -> tuple[Block, ...]:
-    """Return a scene nearly done, or 2 to `most` of its blocks, as its dependencies allow."""
+def stage(scene: Scene, rng: np.random.Generator) -> tuple[Block, ...]:
+    """Return a scene nearly done, in an order that its dependencies allow."""
     order = scene.graph.random_order(rng)
-    if most:
-        kept = int(rng.integers(2, most + 1))
-    else:
-        kept = len(order) - int(rng.integers(min(_MOST_LEFT_OUT, max(len(order) - 2, 0)) + 1))
+    kept = len(order) - int(rng.integers(min(_MOST_LEFT_OUT, max(len(order) - 2, 0)) + 1))
     return tuple(scene.blocks[vertex] for vertex in sorted(order[:kept]))
 
 
