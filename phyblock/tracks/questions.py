@@ -83,7 +83,7 @@ class VqaSpec(PictureControls):
 
     @property
     def rotations(self) -> int:
-        """How often each question is asked with one seed."""
+        """Return the number of times that each question is asked with one seed."""
         return len(LETTERS) if self.circular else 1
 
 
