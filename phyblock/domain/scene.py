@@ -54,6 +54,29 @@ class AOVGraph:
         return tuple(sum(1 << other for other in needed) for needed in self.depends_on)
 
     @functools.cached_property
+    def unlocks(self) -> tuple[tuple[int, ...], ...]:
+        """For each vertex, those that directly depend on it; ones that unlock the same vertices are
+        interchangeable when they are ready and equal.
+        """
+        n = len(self)
+        return tuple(tuple(w for w in range(n) if v in self.depends_on[w]) for v in range(n))
+
+    @functools.cached_property
+    def below(self) -> tuple[int, ...]:
+        """For each vertex, the bit mask of it and all that it depends on."""
+        below = [1 << v for v in range(len(self))]
+        for vertex in sorted(range(len(self)), key=self.layers.__getitem__):
+            for other in self.depends_on[vertex]:
+                below[vertex] |= below[other]
+        return tuple(below)
+
+    @functools.cached_property
+    def above(self) -> tuple[int, ...]:
+        """For each vertex, the bit mask of it and all that depends on it."""
+        n, below = len(self), self.below
+        return tuple(sum((below[w] >> v & 1) << w for w in range(n)) for v in range(n))
+
+    @functools.cached_property
     def layers(self) -> tuple[int, ...]:
         """Layer of each vertex: 1 on the ground, else 1 + the highest layer it depends on."""
         layers = [0] * len(self)

@@ -114,50 +114,36 @@ class Goal:
     `equal_to[i]` holds the goal vertices, in file order, that equal candidate i (1-based). The
     others are bit masks of vertices: `equal[i]` the same, `of_kind[i]` those of its type and color,
     `kinds` all blocks by type and color, `kind_of_look` the kind of each group of blocks that are
-    equal under the setting. `unlocks[v]` are the vertices that directly depend on v: blocks that
-    unlock the same ones are interchangeable when both are ready. `ways[i]` holds, for each vertex
-    of `equal_to[i]`, the vertex, its mask, and the mask of it and what it directly depends on.
+    equal under the setting. `ways[i]` holds, for each vertex of `equal_to[i]`, the vertex, its
+    mask, and the mask of it and what it directly depends on.
     """
 
     def __init__(self, scene: Scene, candidates: CandidateSet, setting: Setting) -> None:
         attribute = "look" if setting == "A" else "kind"
         self.graph = graph = scene.graph
-        n = len(graph)
-        looks = _groups(getattr(block, attribute) for block in scene.blocks)
-        kinds = _groups(block.kind for block in scene.blocks)
+        looks, kinds = (
+            _groups(getattr(block, name) for block in scene.blocks) for name in (attribute, "kind")
+        )
+        masks = {look: sum(1 << v for v in vertices) for look, vertices in looks.items()}
+        of_kind = {kind: sum(1 << v for v in vertices) for kind, vertices in kinds.items()}
+        ways = {
+            look: [(v, 1 << v, graph.needed_masks[v] | 1 << v) for v in vertices]
+            for look, vertices in looks.items()
+        }
         self.equal_to: dict[int, tuple[int, ...]] = {}
         self.equal: dict[int, int] = {}
         self.of_kind: dict[int, int] = {}
+        self.ways: dict[int, list[tuple[int, int, int]]] = {}
         for index, candidate in enumerate(candidates.candidates, 1):
-            self.equal[index] = equal = looks.get(getattr(candidate, attribute), 0)
-            self.equal_to[index] = tuple(v for v in range(n) if equal >> v & 1)
-            self.of_kind[index] = kinds.get(candidate.kind, 0)
-        self.kinds = tuple(kinds.values())
+            look = getattr(candidate, attribute)
+            self.equal_to[index] = looks.get(look, ())
+            self.equal[index] = masks.get(look, 0)
+            self.of_kind[index] = of_kind.get(candidate.kind, 0)
+            self.ways[index] = ways.get(look, [])
+        self.kinds = tuple(of_kind.values())
         self.kind_of_look = {
-            look: kind for look in looks.values() for kind in self.kinds if look & kind
+            mask: of_kind[scene.blocks[looks[look][0]].kind] for look, mask in masks.items()
         }
-        self.unlocks = [tuple(w for w in range(n) if v in graph.depends_on[w]) for v in range(n)]
-        needs = [mask | 1 << v for v, mask in enumerate(graph.needed_masks)]
-        self.ways = {
-            index: [(v, 1 << v, needs[v]) for v in vertices]
-            for index, vertices in self.equal_to.items()
-        }
-
-    @functools.cached_property
-    def below(self) -> tuple[int, ...]:
-        """For each vertex, the bit mask of it and all that it depends on."""
-        graph = self.graph
-        below = [1 << v for v in range(len(graph))]
-        for vertex in sorted(range(len(graph)), key=graph.layers.__getitem__):
-            for other in graph.depends_on[vertex]:
-                below[vertex] |= below[other]
-        return tuple(below)
-
-    @functools.cached_property
-    def above(self) -> tuple[int, ...]:
-        """For each vertex, the bit mask of it and all that depends on it."""
-        n, below = len(self.graph), self.below
-        return tuple(sum((below[w] >> v & 1) << w for w in range(n)) for v in range(n))
 
     def choices(self, index: int, placed: int) -> list[int]:
         """Ready goal vertices, in file order, that candidate `index` could be placed as."""
@@ -168,7 +154,7 @@ class Goal:
         """The first of each group of vertices that unlock the same blocks."""
         if len(vertices) < 2:
             return list(vertices)
-        return list({self.unlocks[v]: v for v in reversed(vertices)}.values())
+        return list({self.graph.unlocks[v]: v for v in reversed(vertices)}.values())
 
     def error(self, index: int, placed: int) -> ErrorType:
         """The type of a wrong step that names candidate `index` when `placed` are placed."""
@@ -181,11 +167,11 @@ class Goal:
         return "dependency_not_met"
 
 
-def _groups(values: Iterable[Hashable]) -> dict[Hashable, int]:
-    """Return, for each value, the bit mask of the places that have it."""
-    groups: dict[Hashable, int] = {}
+def _groups(values: Iterable[Hashable]) -> dict[Hashable, tuple[int, ...]]:
+    """Return, for each value, the places that have it."""
+    groups: dict[Hashable, tuple[int, ...]] = {}
     for place, value in enumerate(values):
-        groups[value] = groups.get(value, 0) | 1 << place
+        groups[value] = (*groups.get(value, ()), place)
     return groups
 
 
@@ -289,7 +275,9 @@ def most_placed(goal: Goal, plan: Plan) -> int:
                 free = ~placed
                 ready = [(v, itself) for v, itself, needed in ways if needed & free == itself]
                 if len(ready) > 1:
-                    ready = list({goal.unlocks[way[0]]: way for way in reversed(ready)}.values())
+                    ready = list(
+                        {goal.graph.unlocks[way[0]]: way for way in reversed(ready)}.values()
+                    )
                 reached.update([placed | itself for _, itself in ready] or [placed])
             frontier = reached
     return max(mask.bit_count() for mask in frontier)
@@ -385,7 +373,7 @@ def _most_standing(
         if not some:
             best = value
             return
-        above = [goal.above[v] & standing for v in range(len(goal.graph)) if some >> v & 1]
+        above = [goal.graph.above[v] & standing for v in range(len(goal.graph)) if some >> v & 1]
         if surplus == len(above):
             search(standing & ~functools.reduce(operator.or_, above))
             return
@@ -469,10 +457,10 @@ def _kept_after(goal: Goal, equal: int, kept: int, closed: int) -> Iterator[tupl
         bit = free & -free
         free ^= bit
         vertex = bit.bit_length() - 1
-        role = (goal.above[vertex] ^ bit, goal.below[vertex] ^ bit)
+        role = (goal.graph.above[vertex] ^ bit, goal.graph.below[vertex] ^ bit)
         if role not in roles:
             roles.add(role)
-            yield kept | bit, closed | goal.below[vertex]
+            yield kept | bit, closed | goal.graph.below[vertex]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -68,8 +68,8 @@ class Assembly:
         self.chosen: list[int] = []
         self._goal = Goal(gated(scene, gating), candidates, setting)
         self._frontier = {0}
-        self._above = tuple(mask.bit_count() - 1 for mask in self._goal.above)
-        self._roles = [(b.look, self._goal.unlocks[v]) for v, b in enumerate(scene.blocks)]
+        self._above = tuple(mask.bit_count() - 1 for mask in self._goal.graph.above)
+        self._roles = [(b.look, self._goal.graph.unlocks[v]) for v, b in enumerate(scene.blocks)]
 
     @property
     def is_complete(self) -> bool:

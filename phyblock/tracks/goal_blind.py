@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phyblock.config.suite import Suite
-from phyblock.domain.scene import AssemblyTask, Candidate, CandidateSet, Plan, Scene
+from phyblock.domain.scene import AssemblyTask, Candidate, CandidateSet, Kind, Plan, Scene
 from phyblock.scoring.plan import Goal, most_placed
 from phyblock.sim.pictures import PictureStyle, goal_camera, segments
 from phyblock.tracks.base import presented
@@ -69,13 +69,15 @@ AREA_KEYS: tuple[Key, ...] = (
 
 def units(candidates: CandidateSet, setting: Setting, areas: Areas | None = None) -> list[Unit]:
     """Return the units of a candidate set under a setting, by their numbers."""
-    listed, made = list(enumerate(candidates.candidates, 1)), []
-    for number, one in listed:
-        same = tuple(n for n, other in listed if other.kind == one.kind)
-        rank = same.index(number)
-        if setting == "A" or rank == 0:
+    numbers_of: dict[Kind, list[int]] = defaultdict(list)
+    for number, one in enumerate(candidates.candidates, 1):
+        numbers_of[one.kind].append(number)
+    made = []
+    for number, one in enumerate(candidates.candidates, 1):
+        same = tuple(numbers_of[one.kind])
+        if setting == "A" or number == same[0]:
             numbers, area = (number,) if setting == "A" else same, (areas or {}).get(one.color, 0.0)
-            made.append(Unit(numbers, one, len(same), rank, area))
+            made.append(Unit(numbers, one, len(same), same.index(number), area))
     return made
 
 
