@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -27,7 +25,6 @@ from phyblock.sim.dynamics import (
     stands,
 )
 from phyblock.sim.pictures import LEAST_SHOWN, PictureStyle, hidden_blocks, visible_shares
-from phyblock.text import csv_cell
 
 
 @dataclass(frozen=True)
@@ -124,11 +121,6 @@ class SceneFacts:
         return self.finding(check, message, *blocks, **about)
 
 
-def declared_supports(scene: Scene) -> Mapping[int, frozenset[int]]:
-    """Return the declared orders that each block rests on; the ground only by itself."""
-    return {block.order: frozenset(block.depend or {GROUND}) for block in scene.blocks}
-
-
 def _size(facts: SceneFacts) -> Iterator[Finding]:
     """More or fewer blocks, or more layers, than a level of the scene allows."""
     count, layers = len(facts.scene), max(facts.scene.graph.layers, default=0)
@@ -205,9 +197,10 @@ def _floating(facts: SceneFacts) -> Iterator[Finding]:
 
 def _dependencies(facts: SceneFacts, check: str) -> Iterator[Finding]:
     """Supporting contacts that are not declared, or declared dependencies without contact."""
-    declared_of, is_undeclared = declared_supports(facts.scene), check == "undeclared dependency"
-    for i, order in enumerate(declared_of):
-        contacts, declared = facts.contacts[order], declared_of[order]
+    is_undeclared = check == "undeclared dependency"
+    for i, block in enumerate(facts.scene.blocks):
+        order, declared = block.order, frozenset(block.depend or {GROUND})
+        contacts = facts.contacts[order]
         for other in sorted(contacts - declared if is_undeclared else declared - contacts):
             message = f"block {order} does not rest on {_name(other)}, which is declared"
             if is_undeclared:
@@ -289,7 +282,7 @@ PHYSICS = tuple(CHECKS)[5:11]
 """Overlaps, floating blocks, wrong dependencies, and falls."""
 VERIFIED = tuple(name for name in CHECKS if name != "palette")
 """Checks of a scene that was made here, with its candidates."""
-AUDITED = (*PHYSICS, "layer", "order", "candidates")
+FOREIGN_CHECKS = (*PHYSICS, "layer", "order", "candidates")
 """Checks of a scene made elsewhere."""
 
 
@@ -320,13 +313,13 @@ Task = tuple[Scene, CandidateSet | None]
 
 
 def verify_scene(task: Task) -> tuple[Finding, ...]:
-    """Return the findings about a scene made here and its candidate set."""
+    """Return the findings about a scene and its candidate set."""
     return tuple(findings_of(SceneFacts(*task), VERIFIED))
 
 
-def audit_scene(task: Task, tolerances: Tolerances = FOREIGN) -> tuple[Finding, ...]:
-    """Return the findings about a scene made elsewhere and its candidate set, if any."""
-    return tuple(findings_of(SceneFacts(*task, tolerances), AUDITED))
+def verify_foreign(task: Task, tolerances: Tolerances = FOREIGN) -> tuple[Finding, ...]:
+    """Return the findings about a scene of the official data and its candidate set."""
+    return tuple(findings_of(SceneFacts(*task, tolerances), FOREIGN_CHECKS))
 
 
 def check_set(scenes: Sequence[Scene]) -> tuple[Finding, ...]:
@@ -345,16 +338,3 @@ def check_set(scenes: Sequence[Scene]) -> tuple[Finding, ...]:
             message = "name no base scene of the set"
             found.append(Finding(scene.id, "parents", message, (), "parents", str(strange)))
     return tuple(found)
-
-
-def findings_csv(findings: Iterable[Finding], levels: Mapping[str, int]) -> str:
-    """Return findings as CSV text with a header, sorted by scene; `levels` are by scene."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(("scene", "level", "check", "blocks", "value_mm", "tolerance_mm", "message"))
-    for one in sorted(findings, key=lambda finding: finding.scene):
-        blocks = " ".join(map(str, one.blocks))
-        sizes = ("" if mm is None else f"{mm:.3f}" for mm in (one.value_mm, one.tolerance_mm))
-        row = (one.scene, levels[one.scene], one.check, blocks, *sizes, one.message)
-        writer.writerow(map(csv_cell, row))
-    return text.getvalue()

@@ -1,4 +1,4 @@
-"""Checks of scenes: each finds its own fault, in the same words for makers, verifiers, auditors."""
+"""Checks of scenes: each finds its own fault, in the same words for makers and verifiers."""
 
 import shutil
 from dataclasses import replace
@@ -8,15 +8,15 @@ import pytest
 from phyblock.domain.scene import CandidateSet
 from phyblock.domain.symmetry import Symmetry
 from phyblock.making.checks import (
-    AUDITED,
     CHECKS,
     FOREIGN,
+    FOREIGN_CHECKS,
     OURS,
     VERIFIED,
     SceneFacts,
-    audit_scene,
     check_set,
     findings_of,
+    verify_foreign,
     verify_scene,
 )
 from phyblock.making.files import SCENE_FILES, SUMS_FILE, check_sums, sums_text
@@ -93,7 +93,7 @@ SPOILED = {
 
 def test_every_check_has_an_example_here_and_is_chosen_somewhere():
     assert set(SPOILED) == set(CHECKS) == {*VERIFIED, "palette"}
-    assert set(AUDITED) <= set(VERIFIED)
+    assert set(FOREIGN_CHECKS) <= set(VERIFIED)
 
 
 @pytest.mark.parametrize("name", SPOILED)
@@ -161,7 +161,9 @@ def checks_of(findings):
 def test_official_annotation_errors_are_reported(official_checkout):
     tasks = {task.scene.id: task for task in official_tasks(official_checkout)}
     for name in ("000", "001", "040", "069", "187"):
-        found = checks_of(audit_scene((tasks[name].scene, tasks[name].candidates), QUICK_FOREIGN))
+        found = checks_of(
+            verify_foreign((tasks[name].scene, tasks[name].candidates), QUICK_FOREIGN)
+        )
         assert ("overlap" in found) == (name in OVERLAPPING)
         assert ("floating" in found) == ("unstable" in found) == (name in FLOATING)
         assert ("dependency without contact" in found) == (name in {"040", "069"})
@@ -171,7 +173,9 @@ def test_official_annotation_errors_are_reported(official_checkout):
 def test_the_whole_official_data(official_checkout):
     tasks = [(task.scene, task.candidates) for task in official_tasks(official_checkout)]
     with open_workers(2) as workers:
-        audits = dict(zip((s.id for s, _ in tasks), workers.map(audit_scene, tasks), strict=True))
+        audits = dict(
+            zip((s.id for s, _ in tasks), workers.map(verify_foreign, tasks), strict=True)
+        )
 
     def having(*checks):
         return {name for name, found in audits.items() if checks_of(found) & set(checks)}

@@ -4,6 +4,7 @@ import importlib.util
 import io
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -21,7 +22,7 @@ from phyblock.files import LIST, bundled
 from phyblock.making.scenes.production import Production, Share
 from phyblock.sim.engine import other_engine
 from phyblock.workers import open_workers
-from tests.workspace import SCENES, csv_rows, invoked, read_lines, tower, write_lines
+from tests.workspace import SCENES, invoked, read_lines, tower, write_lines
 
 ALONE = ("--jobs", 1)
 SMALL = ("--subtasks", "CO,OC", "--per-subtask", 4, *ALONE)
@@ -162,21 +163,22 @@ def data(tmp_path):
     return write_lines(folder / "scenes.jsonl", [*SCENES, spoiled]).parent
 
 
-def test_an_audit_lists_findings(data, tmp_path):
-    table = tmp_path / "found.csv"
-    told = scenes("audit", data, *ALONE, "--csv", table).stdout
-    assert "6 scenes read; 5 with no finding" in told
-    assert "5 stand when finished, 5 at every step as well" in told
-    assert "block 3 floats 20.00 mm above its support" in told
-    assert "3 green cube" in told
-    rows = csv_rows(table)
-    assert {row["check"] for row in rows if row["scene"] == "t6"} >= {"floating", "unstable"}
+def test_what_was_made_elsewhere_is_verified_too(data, official_checkout, tmp_path):
+    done = scenes("verify", data, *ALONE)
+    assert done.return_value == 1
+    assert re.search(r"floating +5 +6\n", done.stdout)
+    assert "block 3 floats 20.00 mm above its support" in done.output
     with (data / "scenes.jsonl").open("a", encoding="utf-8") as file:
         file.write("{}\n")
     with pytest.raises(DataError, match=r"scenes\.jsonl:7"):
-        scenes("audit", data, *ALONE)
-    with pytest.raises(StoreError, match=r"scenes\.jsonl: cannot be written"):
-        scenes("audit", data, "--csv", data / "scenes.jsonl" / "x")
+        scenes("verify", data, *ALONE)
+    for path in official_checkout.glob("data/SCENEs_400_*_Jsons/00[01]*.json"):
+        copy = tmp_path / "some" / path.relative_to(official_checkout)
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(path, copy)
+    done = scenes("verify", tmp_path / "some", *ALONE)
+    assert re.search(r"candidates +2 +2\n", done.stdout)
+    assert "checksums" not in done.stdout
 
 
 def test_show_prints_the_facts(data):
