@@ -182,10 +182,6 @@ class LimitsSpec(Section):
     retry_for_s: Annotated[float, Field(strict=True, ge=0)] = 300.0
     """Longest outage that a run waits out [s]: a sample is not given up sooner after its first
     failure, and a model whose server cannot be reached for longer is stopped."""
-    max_connection_failures: Count = 20
-    """Failed connections in a row after which a server that has never answered in this run is given
-    up and its models are stopped; also answers in a row with HTTP 2xx and no reply from one that
-    has never given a reply."""
     timeout_s: TimeoutS = 300.0
     """Maximum wait for one reply [s]."""
     batch_poll_s: TimeoutS = 60.0

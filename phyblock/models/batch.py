@@ -25,7 +25,7 @@ from phyblock.models.batch_providers import PROVIDERS, UNREADABLE, BatchProvider
 from phyblock.models.cache import ReplyCache, reply_key
 from phyblock.models.client import Answer, Client, HttpClient
 from phyblock.models.costs import ModelBudget, cost_usd, counted, estimate, may_be_billed
-from phyblock.models.model import ModelEvent, Observer, RetryPolicy
+from phyblock.models.model import ModelEvent, Report, RetryPolicy
 from phyblock.models.request import Request
 from phyblock.records.files import BATCHES
 from phyblock.records.record import BatchEvent, BatchLine, Reply
@@ -129,7 +129,7 @@ class BatchModel:
     cache: ReplyCache | None
     budget: ModelBudget
     policy: RetryPolicy
-    observer: Observer
+    report: Report
     needs_messages: bool = field(default=True, init=False)
 
     def __post_init__(self) -> None:
@@ -339,7 +339,7 @@ class BatchModel:
             return
         await self._note(batch, "created", id=status.id)
         batch.lines.clear()
-        self._report(f"sent batch {batch.shown} of {len(batch.most_usd):,}")
+        self._say(f"sent batch {batch.shown} of {len(batch.most_usd):,}")
 
     async def _find(self, batch: Batch, until_s: float) -> BatchStatus | None:
         """Return the batch that was being sent, or None if there is none; raises UnsureError."""
@@ -415,16 +415,16 @@ class BatchModel:
                 status = await self._provider.status(batch.id)
                 failures, said = 0, status.words
                 if status.state != "running":
-                    self._report(f"batch {batch.shown} has ended: {said}")
+                    self._say(f"batch {batch.shown} has ended: {said}")
                     return status
             except RetryableError as error:
                 failures += 1
-                if failures >= self.policy.max_connection_failures:
+                if failures >= self.policy.attempts:
                     raise
                 said = f"cannot be looked at now ({error})"
             if said != logged:
                 since = batch.created.astimezone().strftime("%d %b %H:%M")
-                self._report(f"waiting for batch {batch.shown} since {since}: {said}")
+                self._say(f"waiting for batch {batch.shown} since {since}: {said}")
                 logged = said
             await asyncio.sleep(pause_s)
             pause_s = min(self.files.poll_s, 1.5 * pause_s)
@@ -444,8 +444,8 @@ class BatchModel:
         reply = reply.model_copy(update={"latency_s": 0.0, "batched": True})
         return reply.model_copy(update={"cost_usd": cost_usd(self.budget.tariff, reply)})
 
-    def _report(self, text: str) -> None:
-        self.observer(ModelEvent(self.name, "batch", text))
+    def _say(self, text: str) -> None:
+        self.report(ModelEvent(self.name, "notice", text))
 
 
 class _NoConnection(HttpClient):

@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import random
 import time
 from collections import deque
-from collections.abc import AsyncIterator, Awaitable, Callable, Hashable, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
-from tenacity import AsyncRetrying, RetryCallState, retry_if_exception_type
+from tenacity import (
+    AsyncRetrying,
+    RetryCallState,
+    retry_if_exception_type,
+    wait_combine,
+    wait_random_exponential,
+)
 
 from phyblock.config.models import DIRECT_PROVIDERS, ModelConfig
 from phyblock.errors import ModelError, Problem, RetryableError, SpecError, UnavailableError
@@ -62,8 +67,8 @@ class Limits:
     """All limits of one model: requests in progress, and requests and tokens in any 60 s.
 
     A single request larger than `tpm` is admitted when nothing was started for a minute, or it
-    could never start. `overall` is shared by all models of a run; `rest_s` returns how long no
-    server of the model may be asked, as after a 429.
+    could never start. `overall` is shared by all models of a run; `cooling_s` returns how long
+    no server of the model may be asked, as after a 429.
     """
 
     def __init__(
@@ -73,14 +78,14 @@ class Limits:
         rpm: int | None = None,
         tpm: int | None = None,
         *,
-        rest_s: Callable[[], float] = lambda: 0.0,
+        cooling_s: Callable[[], float] = lambda: 0.0,
         clock: Clock | None = None,
     ) -> None:
         self._under_way = asyncio.Semaphore(most)
         self._overall = overall
         self._rpm = rpm
         self._tpm = tpm
-        self._rest_s = rest_s
+        self._cooling_s = cooling_s
         self._clock = clock or Clock()
         self._admission = asyncio.Lock()
         self._started: deque[Started] = deque()
@@ -95,8 +100,8 @@ class Limits:
         """
         async with self._under_way:
             async with self._admission:
-                while (wait_s := max(self._rest_s(), self._window_s(tokens))) > 0:
-                    # In short waits, since a resting server may answer earlier.
+                while (wait_s := max(self._cooling_s(), self._window_s(tokens))) > 0:
+                    # In short waits, since the last server may be given up meanwhile.
                     await self._clock.sleep(min(wait_s, _NAP_S))
                 await self._overall.acquire()
                 started = Started(self._clock.now(), tokens)
@@ -129,28 +134,21 @@ class Limits:
         return self._started[must_leave - 1].at_s + WINDOW_S - now if must_leave else 0.0
 
 
-EventKind = Literal["retry", "batch"]
-
-
 @dataclass(frozen=True)
 class ModelEvent:
-    """An event of a model to show to the user.
+    """An event of a model to show to the user, with a safe message.
 
-    `retry`: a request failed, with `status` if the server sent one, and is sent again after
-    `wait_s`; `batch`: a batch was sent, is in progress or has ended. `message` is safe to show.
+    `retry`: a request failed and is sent again after `wait_s`; `notice`: news of a batch, or a
+    server that is not used any more.
     """
 
     model: str
-    kind: EventKind
+    kind: Literal["retry", "notice"]
     message: str
     wait_s: float = 0.0
-    status: int | None = None
 
 
-Observer = Callable[[ModelEvent], None]
-
-Report = Callable[[str], None]
-"""A callback for notices about the whole run, such as an unreachable server or a failed cache."""
+Report = Callable[[ModelEvent], None]
 
 
 @dataclass(frozen=True)
@@ -162,38 +160,26 @@ class RetryPolicy:
     the number of attempts applies.
 
     The wait before attempt n + 1 is uniform between 0 and min(`max_wait_s`, `base_s` * 2^(n-1)),
-    on top of the server's `Retry-After` (followed up to `max_retry_after_s`). A server that has
-    never answered is given up after `max_connection_failures` tries: its address is probably wrong.
+    on top of the server's `Retry-After` (followed up to `max_retry_after_s`).
     """
 
     attempts: int = 8
     retry_for_s: float = 300.0
-    max_connection_failures: int = 20
     base_s: float = 0.5
     max_wait_s: float = 60.0
     max_retry_after_s: float = 120.0
     clock: Clock = field(default_factory=Clock)
 
-    def gives_up(self, error: ModelError, failures: int, failing_for_s: float) -> bool:
-        """True if a request is given up after this many failures in this time."""
-        is_success = error.status is not None and 200 <= error.status < 300
-        return failures >= self.attempts and (is_success or failing_for_s >= self.retry_for_s)
-
     def followed_s(self, error: ModelError) -> float:
         """Return the part of the server's requested wait that is followed [s]."""
         return min(getattr(error, "retry_after_s", None) or 0.0, self.max_retry_after_s)
 
-    def retrying(
-        self,
-        on_retry: Callable[[RetryableError, float], None],
-        is_over: Callable[[], bool] = lambda: False,
-    ) -> AsyncRetrying:
+    def retrying(self, on_retry: Callable[[RetryableError, float], None]) -> AsyncRetrying:
         """Return tenacity's loop for one request, which continues only after a RetryableError.
 
-        `on_retry` is called with the error and the wait [s] before each wait; nothing is retried
-        once `is_over` returns true.
+        `on_retry` is called with the error and the wait [s] before each wait.
         """
-        first_failure_s: list[float] = []
+        failed_s: list[float] = []
 
         def error_of(state: RetryCallState) -> RetryableError:
             error = state.outcome.exception() if state.outcome is not None else None
@@ -201,64 +187,55 @@ class RetryPolicy:
             return error
 
         def stop(state: RetryCallState) -> bool:
-            first_failure_s.append(self.clock.now())
-            lasted_s = first_failure_s[-1] - first_failure_s[0]
-            return is_over() or self.gives_up(error_of(state), state.attempt_number, lasted_s)
-
-        def wait(state: RetryCallState) -> float:
-            doubled_s = self.base_s * 2.0 ** min(state.attempt_number - 1, 60)
-            return self.followed_s(error_of(state)) + random.uniform(
-                0.0, min(self.max_wait_s, doubled_s)
-            )
-
-        def before_sleep(state: RetryCallState) -> None:
-            on_retry(error_of(state), state.upcoming_sleep)
+            # tenacity's stop_after_delay would count the wait for a place before the first attempt.
+            failed_s.append(self.clock.now())
+            was_paid = 200 <= (error_of(state).status or 0) < 300
+            is_over = was_paid or failed_s[-1] - failed_s[0] >= self.retry_for_s
+            return is_over and state.attempt_number >= self.attempts
 
         return AsyncRetrying(
             sleep=self.clock.sleep,
             stop=stop,
-            wait=wait,
+            wait=wait_combine(
+                wait_random_exponential(self.base_s, self.max_wait_s),
+                lambda state: self.followed_s(error_of(state)),
+            ),
             retry=retry_if_exception_type(RetryableError),
-            before_sleep=before_sleep,
+            before_sleep=lambda state: on_retry(error_of(state), state.upcoming_sleep),
             reraise=True,
         )
 
 
-FAILURES_TO_REST = 5
-_REQUESTS_TO_REST = 2
-"""Failed requests that count as an outage: a single one may itself crash the server."""
-_LONGEST_REST_S = 15.0
+MOST_CONNECTION_FAILURES = 10
+"""Failures in a row after which a server is given up that has never answered, or not for long."""
 _GATEWAY = (502, 503, 504)
 _TOO_MUCH = (429, 529)
 
 
 @dataclass(eq=False)
 class Server:
-    """One server. After `failures` in a row, of the requests `failed`, it counts as away since
-    `away_since_s`, and has rested `rests` times. `refusal` is the reason why it is not used any
-    more.
+    """One server, which failed `failures` times in a row since `failing_since_s` and is not asked
+    before `cool_at_s`; `refusal` is the reason why it is not used any more.
     """
 
     name: str
     client: Client
     under_way: int = 0
     sent: int = 0
-    failures: int = 0
-    failed: set[Hashable] = field(default_factory=set)
-    away_since_s: float = 0.0
-    rests: int = 0
-    rested_at_s: float = float("-inf")
-    rests_until_s: float = float("-inf")
     was_heard: bool = False
+    failures: int = 0
+    failing_since_s: float = 0.0
+    cool_at_s: float = float("-inf")
     refusal: UnavailableError | None = None
 
 
 class Servers:
-    """Chooses among the servers of a model: the least loaded one that is not resting.
+    """Chooses among the servers of a model: the least loaded one that is not cooling down.
 
-    An answer of the server itself, even an error 500 or 429, shows that it is up. A failed or lost
-    connection, or a gateway error (502, 503, 504), shows that it is down. A timeout shows neither:
-    some requests are slow. `report` is called with a sentence on changes.
+    A server cools down after two failed or lost connections or gateway errors (502, 503, 504) in a
+    row, longer with each further one, and after a 429 or 529, always for its `Retry-After` at
+    least. A timeout shows nothing: some requests are slow. `report` is called with a sentence on a
+    server that is not used any more.
     """
 
     def __init__(
@@ -275,86 +252,46 @@ class Servers:
             raise UnavailableError(str(refusal), status=refusal.status, sent=refusal.sent)
         return usable
 
-    def rest_s(self) -> float:
+    def cooling_s(self) -> float:
         """Return the seconds until a server may be asked; raises UnavailableError as `usable`."""
-        return max(0.0, min(s.rests_until_s for s in self.usable()) - self._policy.clock.now())
+        return max(0.0, min(s.cool_at_s for s in self.usable()) - self._policy.clock.now())
 
     def pick(self, failed: Server | None = None) -> Server:
-        """Return the server to ask: the one with the fewest requests in progress, not resting.
-
-        A server that just `failed` the request is asked only if there is no other. A server that
-        was away gets a single request at a time until it answers.
-        """
+        """Return the server to ask. One that just `failed` the request is the last choice."""
         now_s = self._policy.clock.now()
-        chosen = min(
+        return min(
             self.usable(),
-            key=lambda s: (max(0.0, s.rests_until_s - now_s), s is failed, s.under_way, s.sent),
+            key=lambda s: (max(0.0, s.cool_at_s - now_s), s is failed, s.under_way, s.sent),
         )
-        if chosen.rests:
-            chosen.rests_until_s = now_s + self._rest_of(chosen)
-        return chosen
 
-    def heard(self, server: Server) -> None:
-        """Record that a server answered."""
-        if server.rests:
-            lasted_s = self._policy.clock.now() - server.away_since_s
-            self._report(f"{server.name} answers again after {lasted_s:.0f} s")
-            server.rests_until_s = float("-inf")
-        server.was_heard, server.failures, server.rests = True, 0, 0
-        server.failed.clear()
+    def failed(self, server: Server, error: ModelError, sent_s: float) -> None:
+        """Record that a request sent at `sent_s` failed.
 
-    def failed(self, server: Server, error: ModelError, request: Hashable, sent_s: float) -> bool:
-        """Record that a request sent at `sent_s` failed. True if that is the server's fault, so
-        that another attempt is free.
-
-        Failures of requests that were sent before a server began to rest are ignored.
+        A server is given up if it refuses every request, or fails many times in a row and has never
+        answered, or not for as long as a request is retried.
         """
-        if isinstance(error, UnavailableError):
-            self._refuse(server, error)
-            return True
-        if error.sent not in ("no", "lost") and error.status not in _GATEWAY:
-            if error.sent == "answered":
-                self.heard(server)
-            return False
+        policy, now_s = self._policy, self._policy.clock.now()
         server.was_heard |= error.status is not None
-        if server.rests and sent_s <= server.rested_at_s:
-            return True
-        now_s = self._policy.clock.now()
-        server.away_since_s = server.away_since_s if server.failures else now_s
-        server.failures += 1
-        server.failed.add(request)
-        if server.failures < FAILURES_TO_REST or len(server.failed) < _REQUESTS_TO_REST:
-            return False
-        server.rests += 1
-        server.rested_at_s = now_s
-        wait_s = max(self._rest_of(server), self._policy.followed_s(error))
-        server.rests_until_s = now_s + wait_s
-        lasted_s, name = now_s - server.away_since_s, server.name
-        tries = FAILURES_TO_REST + server.rests - 1
-        if self._policy.gives_up(error, server.rests, lasted_s):
-            why = f"{name} could not be reached for {lasted_s:.0f} s: {error}"
-            self._refuse(server, UnavailableError(why, sent="no"))
-        elif not server.was_heard and tries >= self._policy.max_connection_failures:
-            why = f"{name} never answered, {tries} times in a row: {error}"
-            self._refuse(server, UnavailableError(why, sent="no"))
-        elif server.rests == 1:
-            self._report(f"{name} cannot be reached, trying now and then: {error}")
-        return True
-
-    def pause(self, server: Server, error: RetryableError, wait_s: float) -> None:
-        """Let a server that reports overload rest for a while."""
-        if error.status in _TOO_MUCH:
-            until_s = self._policy.clock.now() + wait_s
-            server.rests_until_s = max(server.rests_until_s, until_s)
-
-    def _refuse(self, server: Server, error: UnavailableError) -> None:
-        is_first, server.refusal = server.refusal is None, error
-        if is_first and any(other.refusal is None for other in self.all):
-            self._report(f"{server.name} is not used any more: {error}")
-
-    def _rest_of(self, server: Server) -> float:
-        doubled_s = self._policy.base_s * 2.0 ** min(server.rests, 60)
-        return min(_LONGEST_REST_S, self._policy.max_wait_s, doubled_s)
+        is_down = error.sent in ("no", "lost") or error.status in _GATEWAY
+        if is_down and sent_s >= server.cool_at_s:
+            # Others that were sent before it began to cool down show nothing new.
+            server.failing_since_s = server.failing_since_s if server.failures else now_s
+            server.failures += 1
+        elif not is_down and error.sent == "answered":
+            server.failures = 0
+        if is_down or error.status in _TOO_MUCH:
+            wait_s = policy.base_s * (server.failures - 1 if is_down else 1)
+            until_s = now_s + max(min(wait_s, policy.max_wait_s), policy.followed_s(error))
+            server.cool_at_s = max(server.cool_at_s, until_s)
+        lasted_s = now_s - server.failing_since_s
+        is_over = lasted_s >= policy.retry_for_s or not server.was_heard
+        if is_over and server.failures >= MOST_CONNECTION_FAILURES:
+            why = f"{server.name} could not be reached for {lasted_s:.0f} s: {error}"
+            error = UnavailableError(why, sent="no")
+        if isinstance(error, UnavailableError):
+            is_first, server.refusal = server.refusal is None, error
+            if is_first and any(other.refusal is None for other in self.all):
+                self._report(f"{server.name} is not used any more: {error}")
 
 
 @dataclass
@@ -383,7 +320,7 @@ class ChatModel:
     budget: ModelBudget
     journal: Journal | None = None
     policy: RetryPolicy
-    observer: Observer
+    report: Report
     needs_messages: bool = field(default=True, init=False)
 
     def __post_init__(self) -> None:
@@ -426,59 +363,39 @@ class ChatModel:
         call = _Call(request, key, estimate(self.config, request))
 
         def on_retry(error: RetryableError, wait_s: float) -> None:
-            if call.failed_at is not None:
-                self.servers.pause(call.failed_at, error, wait_s)
-            self.observer(ModelEvent(self.name, "retry", str(error), wait_s, error.status))
+            self.report(ModelEvent(self.name, "retry", str(error), wait_s))
 
         try:
-            async for attempt in self.policy.retrying(on_retry, lambda: call.is_cancelled):
+            async for attempt in self.policy.retrying(on_retry):
                 with attempt:
                     return await self._attempt(call)
         except ModelError as error:
-            if call.is_cancelled and isinstance(error, RetryableError):
-                # It would otherwise be sent again.
-                raise asyncio.CancelledError from None
             error.billed_usd = call.billed_usd
             raise
         raise AssertionError("tenacity neither returned nor raised")
 
     async def _attempt(self, call: _Call) -> Reply:
-        """Send once, to a server that does not refuse every request."""
-        expected, who = call.expected, (self.name, call.request.key, call.request.seed)
-        while True:
-            async with self.limits.slot(
-                expected.prompt_tokens + expected.completion_tokens
-            ) as slot:
-                server, began_s = self.servers.pick(call.failed_at), self.policy.clock.now()
+        """Send once, when limits and budget have room."""
+        expected, held = call.expected, None
+        async with self.limits.slot(expected.prompt_tokens + expected.completion_tokens) as slot:
+            if self.budget.tariff is not None:
+                held = await self.budget.reserve(lambda: self.budget.most_usd(expected) or 0.0)
+            exchange = asyncio.ensure_future(self._exchange(call, held))
+            try:
+                reply = await asyncio.shield(exchange)
+            except asyncio.CancelledError:
+                call.is_cancelled = True
                 try:
-                    reply = await self._send(call, server)
-                except ModelError as error:
-                    if isinstance(error, RetryableError):
-                        call.failed_at = server
-                    is_servers_fault = self.servers.failed(server, error, who, began_s)
-                    self.servers.usable()
-                    if is_servers_fault and not call.is_cancelled:
-                        continue
-                    raise
-                self.servers.heard(server)
-                prompt, completion = reply.usage.prompt_tokens, reply.usage.completion_tokens
-                if prompt is not None and completion is not None:
-                    self.limits.settle(slot, prompt + completion)
-                return reply
+                    reply = await exchange
+                except RetryableError:
+                    # It would otherwise be sent again.
+                    raise asyncio.CancelledError from None
+            prompt, completion = reply.usage.prompt_tokens, reply.usage.completion_tokens
+            if prompt is not None and completion is not None:
+                self.limits.settle(slot, prompt + completion)
+            return reply
 
-    async def _send(self, call: _Call, server: Server) -> Reply:
-        """Send with the call's highest cost reserved in the budget."""
-        held = None
-        if self.budget.tariff is not None:
-            held = await self.budget.reserve(lambda: self.budget.most_usd(call.expected) or 0.0)
-        exchange = asyncio.ensure_future(self._exchange(call, server, held))
-        try:
-            return await asyncio.shield(exchange)
-        except asyncio.CancelledError:
-            call.is_cancelled = True
-            return await exchange
-
-    async def _exchange(self, call: _Call, server: Server, held: int | None) -> Reply:
+    async def _exchange(self, call: _Call, held: int | None) -> Reply:
         """Write that a call is sent, send it, and write its end.
 
         A failure that may have been billed counts in full; a failure before anything is sent, and
@@ -493,20 +410,17 @@ class ChatModel:
                 written = await self.journal.sent(self.name, sample, call.key, most_usd)
                 if call.is_cancelled:
                     raise asyncio.CancelledError
-            call.sent += 1
-            server.sent += 1
-            server.under_way += 1
             spent_usd = None
-            try:
-                reply = await server.client.complete(call.request)
-            finally:
-                server.under_way -= 1
-            reply = counted(reply, call.expected)
+            reply = counted(await self._complete(call), call.expected)
             spent_usd = self._cost_usd(reply)
             self.budget.learn(call.expected, reply.usage)
         except ModelError as error:
             is_free = isinstance(error, UnavailableError) or not may_be_billed(error)
             spent_usd = 0.0 if is_free else None
+            self.servers.usable()
+            if isinstance(error, UnavailableError):
+                # The server that refuses every request is left out, and another one is asked.
+                raise RetryableError(str(error), status=error.status, sent="no") from None
             raise
         except Exception:
             spent_usd = 0.0
@@ -520,6 +434,23 @@ class ChatModel:
                 reply = reply.model_copy(update={"cost_usd": self._cost_usd(reply), **known})
             if self.journal is not None and written is not None:
                 await self.journal.ended(written, spent_usd, reply)
+        return reply
+
+    async def _complete(self, call: _Call) -> Reply:
+        """Send to one of the servers, and record whether it answers."""
+        server, sent_s = self.servers.pick(call.failed_at), self.policy.clock.now()
+        call.sent += 1
+        server.sent += 1
+        server.under_way += 1
+        try:
+            reply = await server.client.complete(call.request)
+        except ModelError as error:
+            call.failed_at = server
+            self.servers.failed(server, error, sent_s)
+            raise
+        finally:
+            server.under_way -= 1
+        server.was_heard, server.failures = True, 0
         return reply
 
     def _cost_usd(self, reply: Reply) -> float | None:
@@ -544,17 +475,15 @@ def build_model(
     overall: asyncio.Semaphore | None = None,
     budget: Budget | None = None,
     journal: Journal | None = None,
-    observer: Observer = lambda _: None,
     report: Report = lambda _: None,
     policy: RetryPolicy | None = None,
     batches: BatchFiles | None = None,
 ) -> Model:
     """Return the model of a configuration; nothing is imported or sent before its first request.
 
-    `overall` bounds the requests in progress of all models of a run; `observer` gets events of the
-    model, `report` notices about its servers. `batches` are the files of its batches. Raises
-    SpecError for an unknown baseline, a model without a price under a limit or a provider without
-    batches, DataError for missing recordings.
+    `overall` bounds the requests in progress of all models of a run; `report` gets events of the
+    model. `batches` are the files of its batches. Raises SpecError for an unknown baseline, a model
+    without a price under a limit or a provider without batches, DataError for missing recordings.
     """
     if config.kind == "baseline":
         return open_baseline(config)
@@ -579,7 +508,7 @@ def build_model(
         return LitellmClient(at, http)
 
     shared: dict[str, Any] = {"config": config, "cache": cache, "budget": own, "policy": policy,
-                              "observer": observer}  # fmt: skip
+                              "report": report}  # fmt: skip
     if config.batch:
         from phyblock.models.batch import BatchModel
 
@@ -593,13 +522,13 @@ def build_model(
         )
         for address in config.addresses or (None,)
     ]
-    servers = Servers(each, policy, report)
+    servers = Servers(each, policy, lambda text: report(ModelEvent(config.name, "notice", text)))
     limits = Limits(
         config.max_concurrency,
         overall or asyncio.Semaphore(config.max_concurrency),
         config.rpm,
         config.tpm,
-        rest_s=servers.rest_s,
+        cooling_s=servers.cooling_s,
         clock=policy.clock,
     )
     return ChatModel(servers=servers, limits=limits, journal=journal, **shared)

@@ -65,7 +65,7 @@ class SampleDone:
 
 @dataclass(frozen=True)
 class RunNotice:
-    """A notice about the whole run, such as an unreachable server or a disabled cache."""
+    """A notice about the whole run, such as a disabled cache."""
 
     text: str
 
@@ -236,12 +236,9 @@ class Session:
         if store.progress.batches or any(model.batch for model in plan.models):
             batches = self._batch_files()
 
-        def report(text: str) -> None:
-            self.watch(RunNotice(text))
-
         cache: ReplyCache | None = None
         if self.use_cache and any(model.kind == "litellm" for model in plan.models):
-            cache = ReplyCache(reply_cache_file(), report)
+            cache = ReplyCache(reply_cache_file(), lambda text: self.watch(RunNotice(text)))
             stack.callback(cache.close)
         for file in (store.batches, store.calls):
             stack.push_async_callback(file.drain)
@@ -251,11 +248,8 @@ class Session:
             overall=asyncio.Semaphore(limits.max_concurrency),
             budget=Budget(limits.max_cost_usd, store.progress.limit_usd),
             journal=store,
-            observer=self.watch,
-            report=report,
-            policy=RetryPolicy(
-                limits.max_attempts, limits.retry_for_s, limits.max_connection_failures
-            ),
+            report=self.watch,
+            policy=RetryPolicy(limits.max_attempts, limits.retry_for_s),
         )
         for planned in plan.models:
             if (present := self.present.get(planned.name)) is not None:

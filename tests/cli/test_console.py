@@ -102,7 +102,7 @@ def test_no_cell_of_any_csv_is_a_formula(tmp_path):
 
 def retry(status=429, wait_s=1.0, model="alpha"):
     text = f"HTTP {status}: busy" if status else "no connection to host"
-    return ModelEvent(model, "retry", text, wait_s, status=status)
+    return ModelEvent(model, "retry", text, wait_s)
 
 
 def done(model="alpha", outcome="ok"):

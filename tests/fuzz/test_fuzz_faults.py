@@ -189,7 +189,7 @@ def batch_faults(draw):
 def test_batches(way, faults, kills):
     kind, route = WAYS[way]
     requests = [make_request(f"{n:03d}") for n in range(ASKED)]
-    policy = replace(QUICK, attempts=3, max_connection_failures=3)
+    policy = replace(QUICK, attempts=3)
     with tempfile.TemporaryDirectory() as folder, Running(kind(batch=faults)) as running:
         server = running.server
         config = ROUTES[route].config(running.url, batch=True, price={"input": 1.0, "output": 1.0})

@@ -108,7 +108,6 @@ def make_model(
     *,
     cache: ReplyCache | None = None,
     overall: asyncio.Semaphore | None = None,
-    told: list[str] | None = None,
     budget: Budget | None = None,
     events: list[ModelEvent] | None = None,
     policy: RetryPolicy = QUICK,
@@ -119,9 +118,8 @@ def make_model(
         cache=cache,
         overall=overall or asyncio.Semaphore(64),
         budget=budget,
-        observer=(events if events is not None else []).append,
+        report=(events if events is not None else []).append,
         policy=policy,
-        report=(told if told is not None else []).append,
     )
 
 
@@ -195,7 +193,7 @@ async def command(
         config,
         cache=cache,
         budget=budget,
-        observer=(told if told is not None else []).append,
+        report=(told if told is not None else []).append,
         policy=policy,
         batches=disk.files({one.sample for one in requests} if anew else (), len(requests)),
     )

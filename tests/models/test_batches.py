@@ -192,7 +192,7 @@ TROUBLE = {
 def test_what_cannot_be_learned_now_stops_the_model_and_is_learned_by_the_next_command(
     route, disk, calls
 ):
-    policy = replace(QUICK, attempts=3, max_connection_failures=3)
+    policy = replace(QUICK, attempts=3)
     requests, budget = requests_of(2), Budget(1e9)
     with serving(route, BatchFaults(calls=calls)) as (server, config):
         ended = run_command(config, disk, requests, policy=policy, budget=budget)

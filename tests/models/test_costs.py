@@ -53,7 +53,7 @@ PICTURES = """
 openai/gpt-4o-mini-2024-07-18 512 512 8500          openrouter/openai/gpt-4o-mini 1024 1024 25501
 openai/gpt-4o-2024-08-06 1024 1024 765              openai/gpt-4o-2024-08-06:low 1024 512 85
 openai/gpt-4o-2024-08-06:high 1024 1024 765         openai/gpt-4.1-mini 1024 1024 1659
-openai/o4-mini 2048 2048 2617                       openai/gpt-4.1-nano 64 33 10
+openai/o4-mini 2048 2048 2642                       openai/gpt-4.1-nano 64 33 10
 openai/gpt-5.6 1024 512 615                         openai/gpt-5.6-luna 1024 1024 1229
 openai/gpt-5.6 2048 2048 4916                       openai/gpt-5.6:low 1024 512 154
 openai/gpt-5.6:original 4096 2048 9831              openai/gpt-6-luna:high 2048 2048 3000

@@ -7,16 +7,19 @@ import sqlite3
 import time
 from collections import Counter
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import pytest
 
 from phyblock.models.cache import ReplyCache
+from phyblock.models.model import RetryPolicy
 from phyblock.records.files import STOPPED, read_stopped
 from phyblock.results.load import load_run
+from phyblock.run import runner
 from tests.servers.chassis import ISSUE_MIX, Faults, Running
 from tests.servers.openai_chat import OpenAIChat
-from tests.workspace import TWICE
+from tests.workspace import TWICE, call
 
 
 class BySeed(OpenAIChat):
@@ -96,17 +99,19 @@ def test_a_model_that_cannot_answer_is_stopped_alone(workspace):
     assert [server.ended["ok"] for server in servers] == [100, 100, 100]
 
 
-def test_a_server_that_is_gone_stops_its_model_and_leaves_the_samples(workspace):
-    workspace.write_models("http://127.0.0.1:9", "alpha")
-    workspace.write_suite(models=["alpha", "random"], seeds=list(range(20)), limits=TWICE)
-    done = workspace.run()
-    assert (done.code, done.err) == (1, "")
-    assert done.out.count("http://127.0.0.1:9 cannot be reached, trying now and then") == 1
-    assert "alpha was stopped: http://127.0.0.1:9 could not be reached" in done.out
-    assert "100 of 200 samples are done" in done.out
-    assert "run the same command again" in done.out
-    assert {record["model"] for record in workspace.records()} == {"random"}
-    assert coverage(workspace)["alpha"]["api_error"] == "0"
+def test_a_server_that_is_gone_stops_its_model_and_leaves_the_samples(inside, monkeypatch, capsys):
+    """With waits a hundred times shorter."""
+    monkeypatch.setattr(runner, "RetryPolicy", partial(RetryPolicy, base_s=0.005))
+    inside.write_models("http://127.0.0.1:9", "alpha")
+    inside.write_suite(models=["alpha", "random"], seeds=list(range(20)))
+    assert call("run", "suite.yaml", "--out", inside.out) == 1
+    out, err = capsys.readouterr()
+    assert err == ""
+    assert "alpha was stopped: http://127.0.0.1:9 could not be reached" in out
+    assert "100 of 200 samples are done" in out
+    assert "run the same command again" in out
+    assert {record["model"] for record in inside.records()} == {"random"}
+    assert coverage(inside)["alpha"]["api_error"] == "0"
 
 
 def test_each_way_to_fail_is_an_outcome_of_its_own(workspace):

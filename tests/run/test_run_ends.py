@@ -358,7 +358,7 @@ def test_a_wait_for_a_server_that_cannot_be_reached_is_given_up(workspace):
     workspace.write_models("http://127.0.0.1:9", "alpha")
     workspace.write_suite(models=["alpha"], seeds=[0, 1, 2, 3])
     process = workspace.start()
-    while "http://127.0.0.1:9 cannot be reached" not in process.stdout.readline():
+    while "no connection to 127.0.0.1:9" not in process.stdout.readline():
         assert process.poll() is None
     process.send_signal(signal.SIGINT)
     code, out, err = ended(process)
