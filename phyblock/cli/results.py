@@ -401,6 +401,5 @@ def site(runs: tuple[Path, ...], out: Path, data: tuple[Path, ...], title: str) 
     made = write_site(runs, out, data, title)
     if made.lacking:
         console.print(made.lacking)
-    counts = f"{made.models:,} models and baselines, {counted(made.samples, 'sample')}"
-    console.print(f"{counts}, {made.size_bytes / _MB:.1f} MB:")
+    console.print(f"{made.models:,} models and baselines, {counted(made.samples, 'sample')}:")
     print_path(console, made.path)

@@ -116,7 +116,7 @@ def run(
     if held is not None and not is_as_it_was and not dry_run:
         from phyblock.web.report import files_of
 
-        OutFolder(folder).check(files_of(page=not no_report))
+        OutFolder(folder).check(files_of())
     asks: dict[str, Any] = {"use_cache": not no_cache, "retry_failed": retry_failed}
     if dry_run:
         print_estimate(console, plan, estimate(plan, folder, **asks))
@@ -282,7 +282,7 @@ def play(
     plan = plan_session(read_suite(suite, sets), person, limit)
     folder = out or plan.folder_in(Path("results"))
     if held_run(folder, plan.manifest) is not None:
-        OutFolder(folder).check(files_of(page=True))
+        OutFolder(folder).check(files_of())
     for other in beside:
         load_run(other)
     console = make_console()

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
+from textwrap import shorten
 from typing import Any
 
 import pandas as pd
@@ -325,5 +326,4 @@ def shortfalls(run: Run, track: str) -> Mapping[str, str]:
 
 def short(message: str) -> str:
     """Return a message as one short line, without a final period."""
-    text = " ".join(message.split()).rstrip(".")
-    return text if len(text) <= _MOST_CHARACTERS else f"{text[:_MOST_CHARACTERS].rstrip()} …"
+    return shorten(message, _MOST_CHARACTERS, placeholder=" …").rstrip(".")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import re
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
@@ -13,30 +11,21 @@ from typing import Any
 from pydantic import BaseModel
 
 from phyblock.bundle import opened_bundle
-from phyblock.errors import DataError, Problem, SpecError, StoreError
-from phyblock.files import LIST, OutFolder, digest_of_file, writing
+from phyblock.errors import DataError, Problem, SpecError
+from phyblock.files import OutFolder, digest_of_file
 from phyblock.records.files import MANIFEST, RECORDS
 from phyblock.results.load import Run, load_run
 from phyblock.sim.pictures import Lookout, PictureStyle
-from phyblock.tracks.base import CARRYING, kind_of
+from phyblock.tracks.base import kind_of
 from phyblock.web.board import SiteRun, board_of, entries_of, open_sources
 from phyblock.web.pack import build_of, card_png, pack_samples, write_page
 
 INDEX = "index.html"
 _DATA = "data/"
-_PARTIAL = re.compile(r"\.[0-9a-f]{32}\.part")
-_MAY_DIFFER = ("pictures",)
-"""Parts of a track's identity: digests of pictures, which change with their size."""
 _CONTROLS = frozenset({"blind", "prompt", "path", "size_px"})
 """Fields of pictures and of a track's section of the suite that may differ, are shown with the run,
 or are compared by their digest.
 """
-_HINTS = {
-    "sha256": "give all runs the same levels and --limit, or make a site of each",
-    CARRYING: "run the older one again, as phyblock score leaves what was carried out as it was, "
-    "or make a site of each",
-}
-"""Hints by the last part of the name of what differs."""
 _FAILURES = 4
 _ABOUT = (
     "Can vision-language models build what they see? A model gets a picture of a structure and of "
@@ -46,14 +35,13 @@ _ABOUT = (
 
 @dataclass
 class SiteWritten:
-    """A written site: its page, numbers of models (with baselines) and samples, size, and the
-    reason why it draws nothing, or "".
+    """A written site: its page, numbers of models (with baselines) and samples, and the reason why
+    it draws nothing, or "".
     """
 
     path: Path
     models: int
     samples: int = 0
-    size_bytes: int = 0
     lacking: str = ""
 
 
@@ -67,10 +55,8 @@ def write_site(
     table, StoreError for a path that is not a run, a bundle that does not verify, or a folder that
     holds files of others, DataError for a bundle whose data are not found.
     """
-    if not paths:
-        raise SpecError(Problem("site", "needs a run", allowed="run folders and bundles"))
     folder = OutFolder(out)
-    _check_place(folder)
+    folder.check([INDEX, _DATA])
     with ExitStack() as kept:
         runs = open_runs(paths, data, kept)
         check_runs(runs)
@@ -91,35 +77,18 @@ def write_site(
         made = SiteWritten(out / INDEX, len(entries))
 
         def make(new: Path) -> dict[str, Any]:
-            index = pack_samples(new, build, runs, entries, failures=_FAILURES, is_cut=True)
+            index = pack_samples(new, build, runs, entries, failures=_FAILURES)
             goal = None
             for row in index["telling"][:1]:
                 scene = index["scenes"][index["items"]["scene"][index["rows"]["item"][row]]]
                 task = next(one.sources.tasks[scene] for one in runs if scene in one.sources.tasks)
                 goal = Lookout(task.scene, PictureStyle(size_px=560)).image(task.scene.blocks)
             (new / "card.png").write_bytes(card_png(title, finding, goal))
-            made.size_bytes = sum(path.stat().st_size for path in new.iterdir())
             made.samples, made.lacking = len(index["rows"]["entry"]), index["lacking"]
             return facts
 
         write_page(folder, INDEX, _DATA, build, make)
-    made.size_bytes += made.path.stat().st_size
     return made
-
-
-def _check_place(folder: OutFolder) -> None:
-    """Raise StoreError unless the folder is new, empty, or holds a site."""
-    out = folder.path
-    if out.exists() and not out.is_dir():
-        raise StoreError(Problem(str(out), "is not a folder"))
-    with writing(out, "choose another folder with --out"):
-        found = {entry.name for entry in os.scandir(out)} if out.exists() else set()
-    strangers = sorted(n for n in found if n != LIST and not _PARTIAL.fullmatch(n))
-    if strangers and INDEX not in folder.names(INDEX) and not folder.names(_DATA):
-        shown = ", ".join(strangers[:3]) + (", ..." if len(strangers) > 3 else "")
-        message, hint = "is not empty and holds no site", "name a new or an empty folder with --out"
-        raise StoreError(Problem(str(out), message, found=shown, hint=hint))
-    folder.check([INDEX, _DATA])
 
 
 def open_runs(paths: Sequence[Path], data: Sequence[Path], kept: ExitStack) -> tuple[SiteRun, ...]:
@@ -167,11 +136,10 @@ def check_runs(runs: Sequence[SiteRun]) -> None:
             found, wanted = (_facts(side.run, shared) for side in (one, first))
             message = f"cannot share a table with {first.where}"
             differences = [
-                Problem(one.where, message, name, str(value), str(other), hint)
+                Problem(one.where, message, name, str(value), str(other), "make a site of each")
                 for name, value in found.items()
                 # The prompt of a recording is unknown, and a baseline has none.
                 if None not in (value, other := wanted.get(name)) and value != other
-                for hint in [_HINTS.get(name.rpartition(".")[2], "make a site of each")]
             ]
             problems += differences
             if differences:
@@ -203,7 +171,8 @@ def _facts(run: Run, shared: Sequence[str]) -> dict[str, Any]:
             if isinstance(value, Mapping) and {"name", "version"} <= value.keys():
                 # A prompt is known by its name and digest.
                 value = f"{value['name']} ({str(value['version'])[:12]})"
-            if key not in _MAY_DIFFER:
+            # Digests of pictures change with their size.
+            if key != "pictures":
                 found[f"tracks.{track}.{key}"] = value
         held: dict[str, BaseModel] = {}
         if identity.get("pictures") is not None:

@@ -15,7 +15,7 @@ import os
 import re
 import textwrap
 import zlib
-from collections import defaultdict
+from collections import ChainMap, defaultdict
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields as dataclass_fields
 from dataclasses import is_dataclass
@@ -58,8 +58,6 @@ _LEFT_OUT = frozenset(
 )
 """Fields of records that the index has, or that a page does not show as they are."""
 _OF_QUESTION = ("subtask", "text", "options", "answer_letters", "pictures", "evidence")
-_LONGEST = {"text": 6000, "reasoning": 2000}
-"""Characters of a reply that a site shows; the bundle has all of it."""
 _CARD_PX = (1200, 630)
 _INSTRUCTIVE_BLOCKS = 6
 """A failure is most instructive if its goal has about this many blocks."""
@@ -143,14 +141,13 @@ def pack_samples(
     *,
     failures: int,
     sent: SentPictures | None = None,
-    is_cut: bool = False,
 ) -> dict[str, Any]:
     """Write the scripts of single samples and three.js; return the index of all samples and items
     as columns, which is the script `samples`.
 
-    Every sample has its newest record, with the prompt as sent if `sent` is given, and with long
-    replies cut if it `is_cut`. The index names up to `failures` samples that show how models fail.
-    Raises OSError if the disk fails, StoreError for an unreadable record.
+    Every sample has its newest record, with the prompt as sent if `sent` is given. The index names
+    up to `failures` samples that show how models fail. Raises OSError if the disk fails, StoreError
+    for an unreadable record.
     """
     packs = {
         kind: Pack(folder, kind, build) for kind in ("records", "scenes", "questions", "prompts")
@@ -200,7 +197,7 @@ def pack_samples(
                     outcomes[record.outcome],
                     None if score is None else round(score, 1),
                     # A bit for each type of wrong step.
-                    sum(1 << errors[why] for why in set(filter(None, wrong))),
+                    sum(1 << errors[why] for why in dict.fromkeys(filter(None, wrong))),
                 )
             )
             first = next((n for n, why in enumerate(wrong) if why), 0)
@@ -208,13 +205,11 @@ def pack_samples(
             if first >= 2 and record.scene in one.sources.tasks and record.model not in rules:
                 weight = min(first, 4) - abs(record.n_blocks - _INSTRUCTIVE_BLOCKS)
                 found.append(_Failure(str(wrong[first]), record.model, weight, len(rows) - 1))
-            packs["records"].add(_entry(record, design.matcher, prompts, sent, is_cut))
-    is_drawn = False
+            packs["records"].add(_entry(record, design.matcher, prompts, sent))
+    known = ChainMap(*(dict(one.sources.tasks) for one in runs))
+    is_drawn = any(scene in known for scene in scenes)
     for scene in scenes:
-        tasks = (one.sources.tasks.get(scene) for one in runs)
-        task = next(filter(None, tasks), None)
-        is_drawn |= task is not None
-        packs["scenes"].add(task and _scene(task))
+        packs["scenes"].add(_scene(known[scene]) if scene in known else None)
     for pack in packs.values():
         pack.close()
     starts_of = {kind: pack.starts for kind, pack in packs.items()}
@@ -247,11 +242,7 @@ def _columns(names: str, rows: Sequence[tuple[Any, ...]]) -> dict[str, list[Any]
 
 
 def _entry(
-    record: Record,
-    matcher: str,
-    prompts: Mapping[str, int],
-    sent: SentPictures | None,
-    is_cut: bool,
+    record: Record, matcher: str, prompts: Mapping[str, int], sent: SentPictures | None
 ) -> dict[str, Any]:
     """Return a record as data of a page."""
 
@@ -267,11 +258,7 @@ def _entry(
         return {"prompt": {"template": one.template, "n": number, "images": images}}
 
     def reply(one: Mapping[str, Any]) -> dict[str, Any]:
-        kept = {name: value for name, value in one.items() if value not in (None, "")}
-        for name, most in _LONGEST.items():
-            if is_cut and len(text := kept.get(name, "")) > most:
-                kept |= {name: text[:most], f"{name}_characters": len(text)}
-        return kept
+        return {name: value for name, value in one.items() if value not in (None, "")}
 
     fields = record.fields()
     left = ((name, value) for name, value in fields.items() if name not in _LEFT_OUT)

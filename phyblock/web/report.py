@@ -24,8 +24,9 @@ from phyblock.web.board import (
 from phyblock.web.pack import PICTURES, SentPictures, build_of, pack_samples, write_page
 
 _FOLDER = "report/"
+_PAGE = (REPORT_FILE, _FOLDER, PICTURES)
+"""The page and the folders beside it in a run folder."""
 _FAILURES = 6
-_MOST_NAMED = 6
 
 
 def cautions(run: Run) -> tuple[str, ...]:
@@ -37,14 +38,11 @@ def cautions(run: Run) -> tuple[str, ...]:
             f"This run is not finished: {recorded:,} of {expected:,} samples have a record."
         )
     tracks = run.design.suite.tracks
-    lacking = [
+    sentences += [
         f"{model}{f', {kind_of(track).title}' if len(tracks) > 1 else ''}: {said}."
         for track in tracks
         for model, said in shortfalls(run, track).items()
     ]
-    sentences += lacking[:_MOST_NAMED]
-    if (rest := len(lacking) - _MOST_NAMED) > 0:
-        sentences.append(f"And {rest} more lack replies: see the table of coverage.")
     if stopped.run:
         sentences.append(f"The last session was stopped: {short(stopped.run)}.")
     if run.is_cut:
@@ -69,7 +67,7 @@ def write_report(written: TablesWritten, data: Path | None = None) -> Path:
     run = written.run
     one = SiteRun(str(run.path), run, open_sources(run, data))
     out = OutFolder(run.path)
-    out.check(page_files())
+    out.check(_PAGE)
     paths = [run.path / name for name in (MANIFEST, RECORDS, PROMPTS, STOPPED)]
     build = build_of(one.sources.lacking, [digest_of_file(p) for p in paths if p.exists()])
 
@@ -88,14 +86,9 @@ def write_report(written: TablesWritten, data: Path | None = None) -> Path:
     return write_page(out, REPORT_FILE, _FOLDER, build, make, lasting=[PICTURES])
 
 
-def files_of(*, page: bool) -> tuple[str, ...]:
-    """Return the files that a run folder may get: tables, summary, and with `page` the page."""
-    return (*table_files(), SUMMARY, *(page_files() if page else ()))
-
-
-def page_files() -> tuple[str, ...]:
-    """Return the names of the page and the folders beside it in a run folder."""
-    return (REPORT_FILE, _FOLDER, PICTURES)
+def files_of() -> tuple[str, ...]:
+    """Return the files that a run folder may get: tables, summary and page."""
+    return (*table_files(), SUMMARY, *_PAGE)
 
 
 def report_files(folder: Path) -> dict[str, Path]:

@@ -128,13 +128,6 @@ class PersonModel:
         """Do nothing: nothing is held open."""
 
 
-def pictures_of(request: Request) -> tuple[Image, ...]:
-    """Return every picture of a request in the order sent."""
-    return tuple(
-        part for message in request.messages for part in message.parts if isinstance(part, Image)
-    )
-
-
 def shown(
     request: Request, picking: Picking, place: Mapping[str, int], addresses: Sequence[str]
 ) -> dict[str, Any]:
@@ -143,7 +136,7 @@ def shown(
     It contains nothing else of an item: no name, no scene, no answer. `place` is the number of the
     item (0: a warm-up), the number of items, and the turn; `addresses` are those of its pictures.
     """
-    pictures, left = pictures_of(request), iter(addresses)
+    pictures, left = request.images, iter(addresses)
     last = {picture.label: (n, picture) for n, picture in enumerate(pictures)}
 
     def part_of(part: str | Image) -> dict[str, Any]:
@@ -276,7 +269,7 @@ class PlaySession:
                 asked, now_s = self._asked, self._clock()
                 # The clock starts when the question is first sent.
                 asked.since_s = now_s if asked.since_s is None else asked.since_s
-                count = len(pictures_of(asked.request))
+                count = len(asked.request.images)
                 addresses = [f"picture/{self._number}/{n}" for n in range(count)]
                 state["question"] = shown(asked.request, asked.picking, asked.place, addresses)
                 state |= {"elapsed_s": asked.seen_s(now_s), "exact": self._is_exact}
@@ -287,7 +280,7 @@ class PlaySession:
         with self._changed:
             if self._asked is None or self._phase != "question" or change != self._number:
                 return None
-            pictures = pictures_of(self._asked.request)
+            pictures = self._asked.request.images
             return pictures[number] if 0 <= number < len(pictures) else None
 
     def drawn(self, name: str) -> bytes | None:

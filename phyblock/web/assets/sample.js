@@ -218,8 +218,7 @@ const Sample = (() => {
 
   function texts(reply) {
     if (!reply) return null;
-    const text = (name) => [el("pre", { class: "text reply", tabindex: 0 }, reply[name] || "(empty)"),
-      reply[`${name}_characters`] ? el("p", { class: "muted" }, `Cut here: it has ${reply[`${name}_characters`].toLocaleString("en")} characters.`) : null];
+    const text = (name) => el("pre", { class: "text reply", tabindex: 0 }, reply[name] || "(empty)");
     return [reply.reasoning ? folded("Reasoning", text("reasoning")) : null, text("text")];
   }
 
