@@ -1,32 +1,25 @@
-"""Workers: this process, several, a Ray cluster, or programs that share a folder of results.
-
-Worker processes ignore Ctrl-C, end with the process that started them, and do not import its main
-module. `multiprocessing` would import it in each process: a program that calls phyblock without a
-guard would run again there. A worker is `python -c` in a session of its own, and takes its jobs
-from a pipe.
-"""
+"""Workers: this process, several, a Ray cluster, or programs that share a folder of results."""
 
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import importlib
 import os
 import pickle
-import queue
-import subprocess
-import sys
+import signal
 import threading
 import time
-import traceback
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
+from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from functools import partial
 from itertools import islice
-from multiprocessing import Pipe
-from multiprocessing.connection import Connection
+from multiprocessing import get_context, parent_process
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import IO, Any, TypeVar
 
 from phyblock.errors import InputError, PhyblockError, Problem, StoreError
 from phyblock.files import atomic_write, make_folder, read_text, writing
@@ -36,121 +29,48 @@ T = TypeVar("T")
 R = TypeVar("R")
 _RAY_RETRIES = 5
 _BATCH = 16
-_WAITING = 4
-"""Batches that may wait for an earlier one, as a multiple of those in progress."""
-_BEAT_S, _GONE_S, _LOOK_S = 2.0, 30.0, 0.1
-"""Intervals at which a shard signals that it runs, after which a silent one counts as stopped, and
-at which others look for its results.
-"""
+_AHEAD, _SHARED_AHEAD = 16, 2
+"""Batches in progress or waiting for an earlier one, by processor; fewer where each has a lock."""
+_LOOK_S = 0.1
+"""Interval at which a shard looks for a batch that another one computes."""
 
 
-class WorkerDiedError(RuntimeError):
-    """The process of a job was killed, or crashed."""
+def open_pool(processes: int) -> ProcessPoolExecutor:
+    """Return a pool of processes, which start with the first jobs and end with this process.
+
+    They import the main module of a program, which needs `if __name__ == "__main__"`. If one is
+    killed, all jobs of the pool fail with BrokenProcessPool.
+    """
+    return ProcessPoolExecutor(processes, get_context("spawn"), _begin, (PLUGINS,))
 
 
-class WorkerPool(Executor):
-    """Runs module-level functions in processes, which start with the first jobs."""
-
-    def __init__(self, workers: int) -> None:
-        self._threads = ThreadPoolExecutor(workers, "worker")
-        self._workers: list[_Worker] = []
-        self._idle: list[_Worker] = []
-
-    def submit(self, fn: Callable[..., T], /, *args: Any, **kwargs: Any) -> Future[T]:
-        """Return the job's future, which fails with WorkerDiedError if its process is killed."""
-        return self._threads.submit(self._run, (fn, args, kwargs))
-
-    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:
-        """Accept no more jobs; with `wait`, end the processes after the accepted ones."""
-        self._threads.shutdown(wait, cancel_futures=cancel_futures)
-        if wait:
-            for worker in self._workers:
-                worker.end()
-
-    def kill(self) -> None:
-        """End the processes at once; jobs in progress fail."""
-        self._threads.shutdown(wait=False, cancel_futures=True)
-        for worker in list(self._workers):
-            worker.process.kill()
-
-    def _run(self, job: object) -> Any:
-        data = pickle.dumps(job)
-        try:
-            worker = self._idle.pop()
-        except IndexError:
-            worker = _Worker()
-            self._workers.append(worker)
-        value, trace = worker.run(data)
-        self._idle.append(worker)
-        if trace is None:
-            return value
-        raise value from RuntimeError(f"in a worker process\n{trace}")
-
-
-class _Worker:
-    def __init__(self) -> None:
-        self.connection, theirs = Pipe()
-        code = f"import sys; sys.path[:] = {sys.path!r}; from phyblock.workers import _serve; "
-        self.process = subprocess.Popen(
-            [sys.executable, "-c", f"{code}_serve({theirs.fileno()}, {PLUGINS!r})"],
-            stdin=subprocess.DEVNULL,
-            pass_fds=(theirs.fileno(),),
-            start_new_session=True,
-            # Threads of BLAS in every process would wait for one another on small matrices.
-            env={"OPENBLAS_NUM_THREADS": "1", **os.environ},
-        )
-        theirs.close()
-
-    def run(self, job: bytes) -> tuple[Any, str | None]:
-        try:
-            self.connection.send_bytes(job)
-            answer = self.connection.recv_bytes()
-        except (EOFError, OSError) as error:
-            self.end()
-            raise WorkerDiedError("a worker process was killed") from error
-        value, trace = pickle.loads(answer)
-        return value, trace
-
-    def end(self) -> None:
-        self.connection.close()
-        self.process.wait()
-
-
-def _serve(number: int, plugins: list[str]) -> None:
-    """Run the jobs that come through a pipe until it is closed."""
+def _begin(plugins: list[str]) -> None:
+    """Prepare a worker process."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    # Threads of BLAS in every process would wait for one another on small matrices.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     for plugin in plugins:
         importlib.import_module(plugin)
-    connection = Connection(number)
-    jobs: queue.SimpleQueue[bytes] = queue.SimpleQueue()
 
-    def receive() -> None:
-        try:
-            while True:
-                jobs.put(connection.recv_bytes())
-        except (EOFError, OSError):
-            # The parent is gone: nobody reads the answer.
-            os._exit(0)
 
-    threading.Thread(target=receive, daemon=True).start()
-    while True:
-        try:
-            function, args, kwargs = pickle.loads(jobs.get())
-            answer = pickle.dumps((function(*args, **kwargs), None))
-        except Exception as error:
-            answer = pickle.dumps((error, traceback.format_exc()))
-        connection.send_bytes(answer)
+def _end_with_parent() -> None:
+    parent = parent_process()
+    assert parent is not None
+    parent.join()
+    os._exit(0)
 
 
 @dataclass
 class Workers:
     """Runs pure functions over tasks in batches of `size`: here, in processes, or on a cluster.
 
-    `submit` starts a job. At most `ahead` are in progress, and a few more wait for an earlier one.
+    `submit` starts a job; `ahead` batches are started before the answers of the first are needed.
     With `shards`, batches are kept in files and shared with other programs.
     """
 
     submit: Callable[..., Future[Any]]
-    ahead: int = 1
+    ahead: int = 0
     size: int = 1
     shards: Shards | None = None
     is_here: bool = False
@@ -162,59 +82,28 @@ class Workers:
         return self._mapped(call, function, iter(tasks))
 
     def _mapped(self, call: int, function: Callable[[T], R], tasks: Iterator[T]) -> Iterator[R]:
-        shards, number, following = self.shards, 0, 0
-        most = _WAITING * self.ahead * (shards.count if shards else 1)
-        running: dict[Future[list[R]], int] = {}
-        others: dict[int, list[T]] = {}
-        done: dict[int, list[R]] = {}
-
-        def start(number: int, batch: list[T]) -> None:
-            running[self.submit(function, batch, PLUGINS)] = number
-
+        started: deque[Future[list[R]] | _SharedBatch] = deque()
+        batches = iter(lambda: list(islice(tasks, self.size)), [])
+        ahead = self.ahead * (self.shards.count if self.shards else 1)
         try:
-            while True:
-                while following in done:
-                    yield from done.pop(following)
-                    following += 1
-                while len(running) < self.ahead and len(running) + len(others) + len(done) < most:
-                    if not (batch := list(islice(tasks, self.size))):
-                        break
-                    if shards is not None and not shards.is_mine(call, number):
-                        others[number] = batch
-                    elif shards is not None and shards.has(call, number):
-                        done[number] = shards.read(call, number)
-                    else:
-                        start(number, batch)
-                    number += 1
-                if following in done:
-                    continue
-                if shards is not None and following in others and shards.has(call, following):
-                    del others[following]
-                    done[following] = shards.read(call, following)
-                elif running:
-                    for job in wait(running, return_when=FIRST_COMPLETED).done:
-                        at = running.pop(job)
-                        done[at] = job.result()
-                        if shards is not None:
-                            shards.keep(call, at, done[at])
-                elif shards is not None and following in others:
-                    if shards.is_left(call, following):
-                        start(following, others.pop(following))
-                    else:
-                        time.sleep(_LOOK_S)
-                else:
-                    return
+            for number, batch in enumerate(batches):
+                job = partial(self.submit, function, batch, PLUGINS)
+                started.append(self.shards.batch(call, number, job) if self.shards else job())
+                if len(started) > ahead:
+                    yield from started.popleft().result()
+            while started:
+                yield from started.popleft().result()
         finally:
-            for job in running:
-                job.cancel()
+            for waiting in started:
+                waiting.cancel()
 
 
 class Shards:
     """Batches in a folder that several programs share, each as one shard.
 
-    Of `count` shards, each computes every `count`-th batch and reads the others. It also computes
-    the batches of a shard that is not running. So shards end whether they run at once or one after
-    another, and continue where they were interrupted.
+    Of `count` shards, each begins with every `count`-th batch, reads what others have computed, and
+    computes what nobody computes. So shards end whether they run at once or one after another, and
+    continue where they were interrupted.
     """
 
     def __init__(self, folder: Path, number: int, count: int, work: str) -> None:
@@ -222,7 +111,7 @@ class Shards:
 
         Raises StoreError if the folder belongs to another job.
         """
-        self.number, self.count, self._folder = number, count, folder
+        self.number, self.count, self._folder = number, count, folder.absolute()
         make_folder(folder)
         path = folder / "work.txt"
         with writing(folder):
@@ -231,70 +120,76 @@ class Shards:
         if (begun := read_text(path)) != work:
             hint = "remove the folder, or give the same arguments"
             raise StoreError(Problem(str(path), "is about other work", "", begun, work, hint))
-        self._stop = threading.Event()
-        self._beating = threading.Thread(target=self._beat, daemon=True)
-
-    def __enter__(self) -> Shards:
-        self._mark(self.number).touch()
-        self._beating.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._stop.set()
-        self._beating.join()
-        self._mark(self.number).unlink(missing_ok=True)
 
     @property
     def writes(self) -> bool:
         """True for the first shard, which writes the results of all."""
         return self.number == 1
 
-    def is_mine(self, call: int, number: int) -> bool:
-        """True if a batch is this shard's."""
-        return self._owner(call, number) == self.number
+    def batch(self, call: int, number: int, job: Callable[..., Future[Any]]) -> _SharedBatch:
+        """Return a batch, which is started if it is this shard's; `job` is given a file to write.
 
-    def has(self, call: int, number: int) -> bool:
-        """True if a batch is done."""
-        return self._file(call, number).exists()
+        The start of a batch that another shard computes waits until its answers are needed.
+        """
+        batch = _SharedBatch(self._folder / f"{call:04d}-{number:06d}.pickle", job)
+        if (call + number) % self.count + 1 == self.number:
+            batch.start()
+        return batch
 
-    def is_left(self, call: int, number: int) -> bool:
-        """True if a batch belongs to another shard that is not running."""
+
+class _SharedBatch:
+    """A batch that is computed by the shard that holds its lock, which ends with the process."""
+
+    def __init__(self, path: Path, job: Callable[..., Future[Any]]) -> None:
+        self._path, self._job = path, job
+        self._started: Future[Any] | None = None
+        self._lock: IO[bytes] | None = None
+
+    def start(self) -> None:
+        """Start the batch, unless its answers are there or another shard computes them."""
+        with writing(self._path):
+            lock = self._path.with_suffix(".lock").open("ab")
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                lock.close()
+                return
+        self._lock = lock
+        if not self._path.exists():
+            self._started = self._job(self._path)
+
+    def result(self) -> Any:
+        """Return the answers, after waiting for the shard that computes them."""
+        while self._started is None and not self._path.exists():
+            self.start()
+            if self._lock is None:
+                time.sleep(_LOOK_S)
         try:
-            seen_s = self._mark(self._owner(call, number)).stat().st_mtime
-        except FileNotFoundError:
-            return True
-        # By the clock of the folder, which may be another machine's.
-        return self._mark(self.number).stat().st_mtime - seen_s > _GONE_S
+            if self._started is None:
+                return pickle.loads(self._path.read_bytes())
+            return self._started.result()
+        finally:
+            self.cancel()
 
-    def read(self, call: int, number: int) -> Any:
-        """Return the answers of a batch that is done."""
-        return pickle.loads(self._file(call, number).read_bytes())
-
-    def keep(self, call: int, number: int, answers: object) -> None:
-        """Keep the answers of a batch."""
-        with writing(self._folder):
-            atomic_write(self._file(call, number), pickle.dumps(answers))
-
-    def _owner(self, call: int, number: int) -> int:
-        return (call + number) % self.count + 1
-
-    def _file(self, call: int, number: int) -> Path:
-        return self._folder / f"{call:04d}-{number:06d}.pickle"
-
-    def _mark(self, number: int) -> Path:
-        return self._folder / f"shard-{number}"
-
-    def _beat(self) -> None:
-        # A shard that cannot signal counts as stopped: others compute its batches too, the same.
-        while not self._stop.wait(_BEAT_S):
-            with contextlib.suppress(OSError):
-                self._mark(self.number).touch()
+    def cancel(self) -> None:
+        """Do not start the batch, if it has not begun, and release its lock."""
+        if self._started is not None:
+            self._started.cancel()
+        if self._lock is not None:
+            self._lock.close()
 
 
-def _each(function: Callable[[T], R], batch: list[T], plugins: list[str]) -> list[R]:
+def _each(
+    function: Callable[[T], R], batch: list[T], plugins: list[str], path: Path | None = None
+) -> list[R]:
+    """Return the answers to a batch; with `path`, keep them in this file too."""
     for plugin in plugins:
         importlib.import_module(plugin)
-    return [function(task) for task in batch]
+    answers = [function(task) for task in batch]
+    if path is not None:
+        with writing(path):
+            atomic_write(path, pickle.dumps(answers))
+    return answers
 
 
 def _done_here(*job: Any) -> Future[Any]:
@@ -317,28 +212,29 @@ def open_workers(
     more. Raises InputError when Ray is not installed or not reachable.
     """
     size = max(size, _BATCH if ray_address or shards else 1)
-    with shards or contextlib.nullcontext():
-        if ray_address is not None:
-            ray = _connected_ray(jobs, ray_address)
+    ahead = _SHARED_AHEAD if shards else _AHEAD
+    if ray_address is not None:
+        ray = _connected_ray(jobs, ray_address)
+        try:
+            # A batch whose worker dies is computed again, with the same result: it is pure.
+            remote = ray.remote(max_retries=_RAY_RETRIES)(_each).remote
+            processors = max(1, int(ray.cluster_resources().get("CPU", 1)))
+            yield Workers(lambda *job: remote(*job).future(), ahead * processors, size, shards)
+        finally:
+            ray.shutdown()
+    elif jobs == 1:
+        yield Workers(_done_here, ahead if shards else 0, size, shards, is_here=True)
+    else:
+        with open_pool(jobs) as pool:
             try:
-                # A batch whose worker dies is computed again, with the same result: it is pure.
-                remote = ray.remote(max_retries=_RAY_RETRIES)(_each).remote
-                ahead = 2 * max(1, int(ray.cluster_resources().get("CPU", 1)))
-                yield Workers(lambda *job: remote(*job).future(), ahead, size, shards)
-            finally:
-                ray.shutdown()
-        elif jobs == 1:
-            yield Workers(_done_here, 1, size, shards, is_here=True)
-        else:
-            with WorkerPool(jobs) as pool:
-                try:
-                    yield Workers(partial(pool.submit, _each), 4 * jobs, size, shards)
-                except WorkerDiedError as error:
-                    raise PhyblockError("a worker process was killed") from error
-                except KeyboardInterrupt:
-                    # Nobody needs the jobs in progress, and workers ignore Ctrl-C.
-                    pool.kill()
-                    raise
+                yield Workers(lambda *job: pool.submit(_each, *job), ahead * jobs, size, shards)
+            except BrokenProcessPool as error:
+                raise PhyblockError("a worker process was killed") from error
+            except KeyboardInterrupt:
+                # Nobody needs the jobs in progress, and workers ignore Ctrl-C.
+                for process in list(pool._processes.values()):
+                    process.kill()
+                raise
 
 
 def _connected_ray(jobs: int, address: str) -> Any:

@@ -6,11 +6,9 @@ import math
 import operator
 import os
 import signal
-import subprocess
-import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
-from operator import truediv
+from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -19,13 +17,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.domain.blocks import euler_deg_to_matrix
-from phyblock.errors import DataError, ModelError, Problem, StoreError
+from phyblock.errors import ModelError, PhyblockError, StoreError
 from phyblock.making.questions.text_probe import text_features
 from phyblock.scoring.pose import Piece, PoseFit, overlap_volume, placed
 from phyblock.sim.geometry import collision_pieces
 from phyblock.text import csv_cell, one_line, plain_sum
 from phyblock.tracks.pose_planning import FITS
-from phyblock.workers import Shards, WorkerDiedError, WorkerPool, open_workers
+from phyblock.workers import Shards, open_workers
 from tests.shipped import built_in_questions
 
 STARTS = tuple("=+-@\t\r\n")
@@ -113,60 +111,14 @@ def test_results_are_those_of_either_sum(compute, monkeypatch):
     assert computed[0] == computed[1]
 
 
-def fail(where):
-    raise DataError(Problem(where, "is broken"))
-
-
 def die(_):
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-def test_jobs_give_what_functions_give_or_raise():
-    with WorkerPool(2) as pool:
-        assert list(pool.map(truediv, range(20), [4] * 20)) == [n / 4 for n in range(20)]
-        with pytest.raises(ZeroDivisionError) as caught:
-            pool.submit(truediv, 1, 0).result()
-        assert "in _serve" in str(caught.value.__cause__)
-        with pytest.raises(DataError, match="here: is broken") as broken:
-            pool.submit(fail, "here").result()
-        assert broken.value.problems == (Problem("here", "is broken"),)
-
-
-def test_a_process_that_is_killed_fails_its_own_job_alone():
-    with WorkerPool(2) as pool:
-        jobs = [pool.submit(die if n == 3 else abs, -n) for n in range(8)]
-        done = [job.exception() or job.result() for job in jobs]
-    assert isinstance(done.pop(3), WorkerDiedError)
-    assert done == [0, 1, 2, 4, 5, 6, 7]
-
-
-UNGUARDED = """
-import os, sys, threading, time
-main = sys.modules["__main__"]
-seen = set()
-def look():
-    while True:
-        seen.add(sys.modules["__main__"])
-threading.Thread(target=look, daemon=True).start()
-from phyblock.workers import WorkerPool
-pool = WorkerPool(1)
-pid = pool.submit(os.getpid).result()
-assert seen == {main}
-print("begun", pid, flush=True)
-pool.submit(time.sleep, 600).result()
-"""
-
-
-def test_a_program_without_a_guard_runs_once_and_takes_its_workers_with_it(tmp_path):
-    (tmp_path / "program.py").write_text(UNGUARDED)
-    words = [sys.executable, str(tmp_path / "program.py")]
-    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as program:
-        begun, pid = program.stdout.readline().split()
-        assert begun == "begun"
-        assert os.getpgid(int(pid)) != os.getpgid(program.pid)
-        program.kill()
-        # The worker holds the pipe open: it ends when the worker has.
-        assert program.stdout.read() == ""
+def test_a_job_that_is_killed_ends_the_command_with_a_message():
+    killed = pytest.raises(PhyblockError, match="a worker process was killed")
+    with killed, open_workers(2) as workers:
+        list(workers.map(die, range(3)))
 
 
 def late(number):
@@ -202,7 +154,7 @@ def test_shards_end_alike_at_once_or_one_after_another_and_go_on(tmp_path, at_on
     with ThreadPoolExecutor(4 if at_once else 1) as threads:
         found = list(threads.map(shard, (3, 1, 4, 2)))
     assert found == [[SQUARES, SQUARES[:1], SQUARES[:40]]] * 4
-    assert at_once or len(done) == 191
+    assert len(done) == 191
     done.clear()
     (tmp_path / "all.shards" / "0000-000003.pickle").unlink()
     assert shard(2) == found[0]
@@ -211,11 +163,19 @@ def test_shards_end_alike_at_once_or_one_after_another_and_go_on(tmp_path, at_on
         Shards(tmp_path / "all.shards", 1, 4, "cubes")
 
 
-def test_processes_that_are_killed_answer_nothing():
-    pool = WorkerPool(2)
-    job = pool.submit(time.sleep, 600)
-    assert pool.submit(abs, -1).result() == 1
-    pool.kill()
-    with pytest.raises(WorkerDiedError):
-        job.result()
-    pool.shutdown()
+def test_a_shard_computes_what_a_killed_one_has_begun(tmp_path):
+    marks = tmp_path / "marks"
+    marks.mkdir()
+    first, second = (Shards(tmp_path / "shards", number, 2, "work") for number in (1, 2))
+    with pytest.raises(PhyblockError), open_workers(2, shards=first) as workers:
+        list(workers.map(partial(killed_once, marks), range(40)))
+    with open_workers(shards=second) as workers:
+        assert list(workers.map(partial(killed_once, marks), range(40))) == list(range(40))
+
+
+def killed_once(marks, number):
+    """Return the number, but kill the process of the first call with 37."""
+    if number == 37 and not list(marks.iterdir()):
+        (marks / "37").touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return number

@@ -84,22 +84,29 @@ class Workshop:
     async def work_out(self, work: Callable[[], _Result]) -> _Result:
         """Return the result of `work`, a `partial` of a module-level function, in a worker process.
 
-        If the process is killed, the work is repeated alone. Raises SimulationError if it is killed
+        If a process is killed, the work is repeated alone. Raises SimulationError if it is killed
         again.
         """
-        from phyblock.workers import WorkerDiedError, WorkerPool
+        from concurrent.futures.process import BrokenProcessPool
 
-        self._pool = self._pool or WorkerPool(self._workers)
+        from phyblock.workers import open_pool
+
         loop = asyncio.get_running_loop()
-        with contextlib.suppress(WorkerDiedError):
-            return await loop.run_in_executor(self._pool, work)
+        pool = self._pool = self._pool or open_pool(self._workers)
+        try:
+            return await loop.run_in_executor(pool, work)
+        except BrokenProcessPool:
+            if self._pool is pool:
+                self._pool = None
         # Alone, so that work that was killed for memory gets all there is.
         async with self._alone:
-            try:
-                return await loop.run_in_executor(self._pool, work)
-            except WorkerDiedError as error:
-                message = "a process that draws and simulates was killed twice"
-                raise SimulationError(message) from error
+            with open_pool(1) as alone:
+                try:
+                    return await loop.run_in_executor(alone, work)
+                except BrokenProcessPool as error:
+                    message = "a process that draws and simulates was killed twice"
+                    hint = 'a script needs `if __name__ == "__main__":` around its calls'
+                    raise SimulationError(f"{message}; {hint}") from error
 
     async def images(self, drawings: Sequence[Drawing]) -> tuple[Image, ...]:
         """Return pictures from memory, from the cache, or drawn now, all in parallel.

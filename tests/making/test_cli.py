@@ -335,9 +335,10 @@ import sys
 from phyblock.workers import open_workers
 from tasks import stay
 
-try:
-    with open_workers(2) as workers:
-        list(workers.map(stay, range(2)))
-except KeyboardInterrupt:
-    sys.exit(130)
+if __name__ == "__main__":
+    try:
+        with open_workers(2) as workers:
+            list(workers.map(stay, range(2)))
+    except KeyboardInterrupt:
+        sys.exit(130)
 """

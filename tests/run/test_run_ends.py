@@ -318,7 +318,7 @@ def test_no_process_outlives_a_killed_run(workspace):
     with prepare(workspace, OpenAIChat()):
         with workspace.start("--yes") as process:
             family = []
-            while not any("phyblock.workers" in " ".join(words_of(child)) for child in family):
+            while not any("spawn_main" in " ".join(words_of(child)) for child in family):
                 assert process.poll() is None
                 family = psutil.Process(process.pid).children(recursive=True)
                 time.sleep(0.01)
