@@ -32,7 +32,6 @@ from phyblock.tracks.base import (
     kind_of,
     open_tracks,
     select_tasks,
-    template_prompt,
 )
 from phyblock.tracks.pictures import Workshop
 
@@ -361,14 +360,7 @@ def prompt_remarks(suite: Suite, plan: RunPlan) -> list[str]:
     """Return a sentence on each custom prompt that is sent."""
     if all(model.kind != "litellm" for model in plan.models):
         return []
-    remarks: dict[str, None] = {}
-    for asked in (suite.at(variant) for variant in plan.variants):
-        for track in asked.tracks:
-            if (path := asked.template(track)) is None:
-                continue
-            prompt = template_prompt(asked, track)
-            files = ", ".join(map(str, (path, *(file.name for file in prompt.included))))
-            line = prompt.unsent_line
-            lost = f"; the text outside of its blocks (line {line}) is NOT sent" if line else ""
-            remarks[f"prompt of {track}: {files}{lost}"] = None
-    return list(remarks)
+    suites = [suite.at(variant) for variant in plan.variants]
+    named = ((track, one.template(track)) for one in suites for track in one.tracks)
+    remarks = (f"prompt of {track}: {path}" for track, path in named if path is not None)
+    return list(dict.fromkeys(remarks))

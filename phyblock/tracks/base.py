@@ -178,8 +178,13 @@ class Track(ABC):
         return "" if self.prompt is None else self.prompt.name
 
     def open_prompt(self) -> Prompt:
-        """Return the prompt of the suite. Raises PromptError for a broken one."""
-        return template_prompt(self.suite, self.name)
+        """Return the suite's own template, else the bundled one for its answer format.
+
+        Raises PromptError for a broken one.
+        """
+        path, bundled = self.suite.template(self.name), self.template_for(self.suite.answer_format)
+        assert bundled is not None, f"{self.name} has no prompt for {self.suite.answer_format}"
+        return TemplatePrompt(path or bundled, "default" if path is None else path.stem)
 
     def shown(self, item: Any, _seed: int) -> Any:
         """Return the item as presented under a seed, used for requests, judgements and counts."""
@@ -500,14 +505,3 @@ def open_tracks(
             message, hint = f"{name} cannot be asked for as JSON", "use answer_format: text"
             raise SpecError(Problem(suite.where(field), message, field, "json_schema", hint=hint))
     return tuple(kind_of(name)(suite, dataset, limit, shop) for name in suite.tracks)
-
-
-def template_prompt(suite: Suite, name: str) -> TemplatePrompt:
-    """Return the prompt of a track: the suite's own template, else the bundled one for its format.
-
-    Raises PromptError for a broken one.
-    """
-    bundled = kind_of(name).template_for(suite.answer_format)
-    assert bundled is not None, f"{name} has no prompt for {suite.answer_format}"
-    default, path = TemplatePrompt(bundled, "default"), suite.template(name)
-    return default if path is None else TemplatePrompt(path, path.stem, default)

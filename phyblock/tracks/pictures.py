@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import os
 import threading
+from collections import defaultdict
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
@@ -77,7 +78,7 @@ class Workshop:
         self._workers = workers or min(_WORKERS, os.cpu_count() or 1)
         self._pool: Executor | None = None
         self._alone = asyncio.Lock()
-        self._making: dict[str, asyncio.Task[bytes]] = {}
+        self._drawn: defaultdict[str, asyncio.Lock] = defaultdict(asyncio.Lock)
         self._recent: dict[tuple[str, str], Image] = {}
         self._recent_lock = threading.Lock()
 
@@ -109,15 +110,12 @@ class Workshop:
                     raise SimulationError(f"{message}; {hint}") from error
 
     async def images(self, drawings: Sequence[Drawing]) -> tuple[Image, ...]:
-        """Return pictures from memory, from the cache, or drawn now, all in parallel.
+        """Return pictures from memory, from the cache, or drawn now.
 
         Raises DataError for a file that is not a picture, StoreError when the cache folder cannot
         be written, SimulationError when a worker was killed.
         """
-        kept = [image for one in drawings if (image := self._kept(one)) is not None]
-        if len(kept) < len(drawings):
-            return tuple(await asyncio.gather(*map(self._image, drawings)))
-        return tuple(kept)
+        return tuple([await self._image(one) for one in drawings])
 
     def outlines(self, drawings: Sequence[Drawing]) -> tuple[Image, ...]:
         """Return the pictures that are in memory or the cache, and for others empty ones of their
@@ -134,16 +132,12 @@ class Workshop:
             self._pool = None
 
     async def _image(self, drawing: Drawing) -> Image:
-        if (kept := self._kept(drawing)) is not None:
-            return kept
-        key = drawing.key
-        if key not in self._making:
-            self._making[key] = asyncio.create_task(self._draw(drawing))
-            # If all waiters were cancelled, nobody retrieves the exception, and asyncio prints it.
-            self._making[key].add_done_callback(lambda done: done.cancelled() or done.exception())
-        # Shielded: others may wait for the same picture when one waiter is cancelled.
-        data = await asyncio.shield(self._making[key])
-        return self._remembered(drawing, data)
+        if (image := self._kept(drawing)) is None:
+            # All who ask for the same picture wait for the first of them.
+            async with self._drawn[drawing.key]:
+                if (image := self._kept(drawing)) is None:
+                    image = self._keep(drawing, await self.work_out(drawing.make))
+        return image
 
     def _kept(self, drawing: Drawing) -> Image | None:
         """Return a picture from memory or the cache; None if it is missing or damaged."""
@@ -166,20 +160,13 @@ class Workshop:
                 del self._recent[next(iter(self._recent))]
         return image
 
-    async def _draw(self, drawing: Drawing) -> bytes:
-        try:
-            data = await self.work_out(drawing.make)
-            self._keep(drawing, data)
-        finally:
-            del self._making[drawing.key]
-        return data
-
-    def _keep(self, drawing: Drawing, data: bytes) -> None:
+    def _keep(self, drawing: Drawing, data: bytes) -> Image:
         self.rendered += 1
         path = self._path(drawing.key)
         with writing(path, "name another cache folder with PHYBLOCK_CACHE"):
             path.parent.mkdir(parents=True, exist_ok=True)
             atomic_write(path, data)
+        return self._remembered(drawing, data)
 
     def _path(self, key: str) -> Path:
         return self._folder / key[:2] / f"{key}.png"
@@ -200,16 +187,9 @@ class LocalShop(Workshop):
         with self._engine_lock:
             return work()
 
-    async def images(self, drawings: Sequence[Drawing]) -> tuple[Image, ...]:
-        """Return pictures from memory, from the cache, or drawn now; raises as a `Workshop`."""
-        images = []
-        for drawing in drawings:
-            if (image := self._kept(drawing)) is None:
-                data = drawing.make()
-                self._keep(drawing, data)
-                image = self._remembered(drawing, data)
-            images.append(image)
-        return tuple(images)
+    async def _image(self, drawing: Drawing) -> Image:
+        image = self._kept(drawing)
+        return self._keep(drawing, drawing.make()) if image is None else image
 
 
 def picture_style(images: ImagesSpec) -> PictureStyle:
@@ -224,45 +204,32 @@ def scene_drawings(task: AssemblyTask, images: ImagesSpec) -> tuple[Drawing, ...
     They are drawn, or cut out of the data set's own composites. A goal that is not shown does not
     affect the size. Raises DataError if the data set lacks a picture that it must provide.
     """
-    is_blind, style = task.is_blind, picture_style(images)
-    is_drawn = images.source == "render"
-    if is_drawn:
-        style = style if is_blind else goal_style(task.scene, style)
-        side = (style.size_px, style.size_px)
-        key = candidates_key(task.candidates, style)
-        grid = Drawing("candidates", key, partial(candidates_png, task.candidates, style), side)
+    if images.source == "dataset":
+        if (path := task.composite) is None:
+            message = "the data set has no picture of it"
+            hint = "render the pictures: --set images.source=render"
+            raise DataError(Problem(f"scene {task.scene.id}", message, hint=hint))
+        key, whole = hex_digest(read_picture(path)), partial(read_picture, path)
+        goal, grid = (
+            Drawing(label, key, partial(_half, path, is_goal=label == "goal"), is_file=True)
+            for label in ("goal", "candidates")
+        )
+        both = Drawing("composite", key, whole, is_file=True)
     else:
-        grid = _cut_out(task, "candidates")
-    if is_blind:
-        return (grid,)
-    if is_drawn:
-        key = goal_key(task.scene, style)
+        style = picture_style(images)
+        style = style if task.is_blind else goal_style(task.scene, style)
+        side, key = (style.size_px, style.size_px), goal_key(task.scene, style)
         goal = Drawing("goal", key, partial(goal_png, task.scene, style), side)
-    else:
-        goal = _cut_out(task, "goal")
-    if images.layout == "separate":
-        return (goal, grid) if images.order[0] == "goal" else (grid, goal)
-    if is_drawn:
-        join = partial(_joined, goal.make, grid.make)
+        key, make = candidates_key(task.candidates, style), partial(candidates_png, task.candidates)
+        grid = Drawing("candidates", key, partial(make, style), side)
         key = hex_digest(f"composite {goal.key} {grid.key}")
-        return (Drawing("composite", key, join, joined_size_px(style.size_px)),)
-    whole = partial(read_picture, _composite(task))
-    return (Drawing("composite", grid.key, whole, is_file=True),)
-
-
-def _cut_out(task: AssemblyTask, label: str) -> Drawing:
-    """Return half of the data set's own composite of a scene, with the key of the whole."""
-    path = _composite(task)
-    half = partial(_half, path, is_goal=label == "goal")
-    return Drawing(label, hex_digest(read_picture(path)), half, is_file=True)
-
-
-def _composite(task: AssemblyTask) -> Path:
-    if task.composite is None:
-        where = f"scene {task.scene.id}"
-        hint = "render the pictures: --set images.source=render"
-        raise DataError(Problem(where, "the data set has no picture of it", hint=hint))
-    return task.composite
+        join = partial(_joined, goal.make, grid.make)
+        both = Drawing("composite", key, join, joined_size_px(style.size_px))
+    if task.is_blind:
+        return (grid,)
+    if images.layout == "composite":
+        return (both,)
+    return (goal, grid) if images.order[0] == "goal" else (grid, goal)
 
 
 def _joined(make_goal: Callable[[], bytes], make_grid: Callable[[], bytes]) -> bytes:

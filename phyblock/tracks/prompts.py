@@ -7,10 +7,11 @@ that is sent: an edit of an included file makes another prompt.
 from __future__ import annotations
 
 import hashlib
+import re
 import traceback
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path, PurePosixPath
+from pathlib import Path
 
 import jinja2
 import jinja2.meta
@@ -23,9 +24,11 @@ from phyblock.models.request import Image, Message
 from phyblock.text import did_you_mean, hex_digest
 
 _LARGEST_BYTES = 256 * 1024
-_COMMON_BLOCKS = ("system", "user", "caption")
-_ALL_BLOCKS = (*_COMMON_BLOCKS, "answer")
+_BLOCKS = ("system", "user", "caption", "answer")
 """Blocks that templates may have; no other would be sent."""
+_TEMPLATE = re.compile(r"(?:[^./\\][^/\\]*/)*[^./\\][^/\\]*\.j2")
+_NAMING = (nodes.Extends, nodes.Include, nodes.Import, nodes.FromImport)
+_names = jinja2.meta.find_referenced_templates
 
 
 @dataclass(frozen=True)
@@ -48,63 +51,46 @@ class OfficialPrompt:
 class TemplatePrompt:
     """A Jinja template with a block `user` and, if wanted, blocks `system` and `caption`.
 
-    Text outside of the blocks is not sent, but they can use its macros, values and imports. Files
-    beside the template, and bundled ones, can be included and imported. It runs in Jinja's
-    sandbox. `caption` is rendered before each picture, with its `label` and its `number` from 1.
-    `included` are the files that it includes or imports.
+    Blocks can use macros, values and imports outside of them. Templates beside it, and bundled
+    ones, can be included and imported. It runs in Jinja's sandbox. `caption` is rendered before
+    each picture, with its `label` and its `number` from 1; `answer` is the form of the answer.
 
     Raises PromptError, naming file and line, when the template cannot be read, is not valid, has no
-    user block or an empty one, has a block that is not used, or uses an unknown name.
+    user block or an empty one, has text or a block that is not sent, or uses an unknown name.
     """
 
-    def __init__(self, path: Path, name: str, like: TemplatePrompt | None = None) -> None:
-        """`like` is the template that this one replaces, whose blocks it may have."""
+    def __init__(self, path: Path, name: str) -> None:
         self.name = name
         self._path = path
-        text, self._tree = _read(path)
-        self._sources = sources = {"": (path, text)}
-        self._read_included(path, self._tree)
-        self.included = tuple(file for inner, (file, _) in self._sources.items() if inner)
-        digest = hashlib.sha256(text.encode())
-        for inner, (_, part) in sorted(self._sources.items())[1:]:
-            digest.update(f"\0{inner}\0{hex_digest(part)}".encode())
-        self.version = digest.hexdigest()
+        self._files: dict[str, tuple[Path, str]] = {}
         self._environment = ImmutableSandboxedEnvironment(
-            loader=jinja2.FunctionLoader(
-                lambda one: (source := sources.get(one)) and (source[1], str(source[0]), None)
-            ),
+            loader=jinja2.FunctionLoader(self._source),
             undefined=jinja2.StrictUndefined,
             trim_blocks=True,
             lstrip_blocks=True,
         )
         # It draws random words, but a prompt must always be the same.
         del self._environment.globals["lipsum"]
-        try:
-            self._template = self._environment.get_template("")
-        except Exception as error:
-            # Python compiles Jinja's output, and has its own limits.
-            raise PromptError(_invalid(path, error)) from error
-        self.blocks = tuple(self._template.blocks)
-        if "user" not in self.blocks:
-            found = ", ".join(sorted(self.blocks)) or "no block"
+        tree = self._read("", path)
+        digest = hashlib.sha256(self._files[""][1].encode())
+        for inner, (_, part) in sorted(self._files.items())[1:]:
+            digest.update(f"\0{inner}\0{hex_digest(part)}".encode())
+        self.version = digest.hexdigest()
+        self._template = self._environment.get_template("")
+        if "user" not in self._template.blocks:
+            found = ", ".join(sorted(self._template.blocks)) or "no block"
             allowed = "{% block user %} ... {% endblock %} and, if wanted, a block system"
             raise PromptError(Problem(str(path), "has no user block", "", found, allowed))
-        known = _ALL_BLOCKS if like is None else tuple({*_COMMON_BLOCKS, *like.blocks})
-        for node in self._tree.body:
-            if isinstance(node, nodes.Block) and node.name not in known:
-                where, hint = f"{path}:{node.lineno}", did_you_mean(node.name, known)
-                allowed, message = ", ".join(sorted(known)), "is a block that nothing uses"
+        allowed = ", ".join(_BLOCKS)
+        for node in tree.body:
+            where = f"{path}:{node.lineno}"
+            if isinstance(node, nodes.Block) and node.name not in _BLOCKS:
+                hint, message = did_you_mean(node.name, _BLOCKS), "is a block that nothing uses"
                 raise PromptError(Problem(where, message, "", node.name, allowed, hint))
-
-    @property
-    def unsent_line(self) -> int | None:
-        """The first line with text outside of all blocks, which is never sent."""
-        for node in self._tree.body:
-            for part in node.nodes if isinstance(node, nodes.Output) else ():
-                if isinstance(part, nodes.TemplateData) and part.data.strip():
-                    before = part.data[: len(part.data) - len(part.data.lstrip())]
-                    return part.lineno + before.count("\n")
-        return None
+            data = node.find_all(nodes.TemplateData) if isinstance(node, nodes.Output) else ()
+            if lost := "".join(part.data for part in data).strip():
+                message, hint = "is outside of the blocks that are sent", "write {# a note #}"
+                raise PromptError(Problem(where, message, "", lost, allowed, hint))
 
     def messages(
         self, pictures: Sequence[Image], facts: Mapping[str, object]
@@ -123,7 +109,7 @@ class TemplatePrompt:
 
     def text(self, block: str, facts: Mapping[str, object]) -> str:
         """Render a block of the template, "" if it has no such block. Raises PromptError."""
-        if block not in self.blocks:
+        if block not in self._template.blocks:
             return ""
         try:
             try:
@@ -142,73 +128,62 @@ class TemplatePrompt:
             # A template is a program, which can fail in any way.
             is_unknown = isinstance(error, jinja2.UndefinedError)
             known = f"names that are there: {', '.join(sorted(facts))}" if is_unknown else ""
-            files = {str(path) for path, _ in self._sources.values()}
+            files = {str(path) for path, _ in self._files.values()}
             frames = traceback.extract_tb(error.__traceback__)
             places = [f"{one.filename}:{one.lineno}" for one in frames if one.filename in files]
             where = [f"{self._path}:1", *places][-1]
             message = f"cannot be rendered: {reason_of(error)}"
             raise PromptError(Problem(where, message, f"block {block}", "", known)) from error
 
-    def _read_included(self, path: Path, tree: nodes.Template) -> None:
-        """Read what a template includes or imports, at any depth, by the names it uses.
+    def _source(self, name: str) -> tuple[str, str, None] | None:
+        """Return the text of a template that was read, and its file, as Jinja's loaders do."""
+        path, text = self._files.get(name, (None, ""))
+        return None if path is None else (text, str(path), None)
 
-        Other files beside templates may hold keys: only files that end in .j2 may be sent, and
-        their names must be known from the text.
-        """
-        for node in tree.find_all((nodes.Extends, nodes.Include, nodes.Import, nodes.FromImport)):
-            where = f"{path}:{node.lineno}"
-            names = list(jinja2.meta.find_referenced_templates(nodes.Template([node])))
+    def _read(self, name: str, path: Path) -> nodes.Template:
+        """Read a template, and what it includes or imports, at any depth."""
+        try:
+            text = read_text(path, _LARGEST_BYTES)
+        except (OSError, ValueError) as error:
+            why = reason_of(error) if isinstance(error, OSError) else f"it {error}"
+            raise PromptError(Problem(str(path), f"cannot be read: {why}")) from error
+        self._files[name] = path, text
+        try:
+            tree = self._environment.parse(text)
+            named = list(tree.find_all(_NAMING))
+            self._environment.get_template(name)
+        except Exception as error:
+            # A text may be too deeply nested to be walked, and Python compiles Jinja's output.
+            line = getattr(error, "lineno", None)
+            where = str(path) if line is None else f"{path}:{line}"
+            raise PromptError(Problem(where, f"is not valid Jinja: {reason_of(error)}")) from error
+        folders = (self._path.parent, bundled("prompts"))
+        for node in named:
+            where, names = f"{path}:{node.lineno}", list(_names(nodes.Template([node])))
             if isinstance(node, nodes.Extends) or not names or not all(names):
                 message = "a prompt names the files that it includes in quotes, and extends none"
                 raise PromptError(Problem(where, message))
-            folders = (self._path.parent, bundled("prompts"))
-            found = {name: _included(name, folders, where) for name in filter(None, names)}
-            there = {name: file for name, file in found.items() if file is not None}
-            if not there and not getattr(node, "ignore_missing", False):
-                allowed = f"a file in {' or '.join(map(str, folders))}"
-                raise PromptError(Problem(where, "no such file", "", ", ".join(found), allowed))
-            for name, file in there.items():
-                if name not in self._sources:
-                    text, inner = _read(file)
-                    self._sources[name] = (file, text)
-                    self._read_included(file, inner)
+            found = {inner: _included(inner, folders) for inner in filter(None, names)}
+            if not any(found.values()) and not getattr(node, "ignore_missing", False):
+                allowed = f"a file that ends in .j2 in {' or '.join(map(str, folders))}, or below, "
+                allowed += "no part of whose path begins with a dot"
+                message, wanted = "includes what is not a template", ", ".join(found)
+                raise PromptError(Problem(where, message, "", wanted, allowed))
+            for inner, file in found.items():
+                if file is not None and inner not in self._files:
+                    self._read(inner, file)
+        return tree
 
 
 Prompt = OfficialPrompt | TemplatePrompt
 """A prompt, which turns pictures and facts about a sample into chat messages."""
 
 
-def _included(name: str, folders: Sequence[Path], where: str) -> Path | None:
-    """Return the file of a name in the first folder that has it. Raises PromptError if it is not a
-    template.
+def _included(name: str, folders: Sequence[Path]) -> Path | None:
+    """Return the template of a name in the first folder that has it, or None.
+
+    Other files may hold keys, which must not be sent: not even by a link.
     """
-    inside = PurePosixPath(name)
-    path = next((folder / inside for folder in folders if (folder / inside).is_file()), None)
-    parts = inside.parts if path is None else (*inside.parts, path.resolve().name)
-    is_open = not (inside.is_absolute() or "\\" in name or any(p[0] == "." for p in parts))
-    if not is_open or (path is not None and not parts[-1].endswith(".j2")):
-        allowed = "a file that ends in .j2, beside the template or below it, no part of whose path "
-        allowed += "begins with a dot"
-        raise PromptError(Problem(where, "includes what is not a template", "", name, allowed))
-    return path
-
-
-def _read(path: Path) -> tuple[str, nodes.Template]:
-    try:
-        text = read_text(path, _LARGEST_BYTES)
-    except (OSError, ValueError) as error:
-        why = reason_of(error) if isinstance(error, OSError) else f"it {error}"
-        raise PromptError(Problem(str(path), f"cannot be read: {why}")) from error
-    try:
-        tree = jinja2.Environment().parse(text)
-        # A text may be nested so deeply that its tree can be parsed but not walked.
-        list(tree.find_all(nodes.Include))
-    except Exception as error:
-        raise PromptError(_invalid(path, error)) from error
-    return text, tree
-
-
-def _invalid(path: Path, error: Exception) -> Problem:
-    line = getattr(error, "lineno", None)
-    where = str(path) if line is None else f"{path}:{line}"
-    return Problem(where, f"is not valid Jinja: {reason_of(error)}")
+    paths = [folder / name for folder in folders] if _TEMPLATE.fullmatch(name) else []
+    found = (one for one in paths if one.is_file() and _TEMPLATE.fullmatch(one.resolve().name))
+    return next(found, None)

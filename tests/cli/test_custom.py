@@ -28,10 +28,6 @@ def test_a_prompt_beside_the_suite_is_used_and_said(asked):
     assert "prompt of full_planning: " in done.out
     assert "prompts/full_planning.j2" in done.out.replace("\n", "")
     assert texts == {"Which of the 16?"}
-    assert "NOT sent" not in done.out
-    own_prompt(asked).write_text(f"{{# mine #}}\n\nYou are a builder.\n{text}", encoding="utf-8")
-    told = " ".join(asked.phyblock("validate", "suite.yaml").out.split())
-    assert "full_planning.j2; the text outside of its blocks (line 3) is NOT sent" in told
 
 
 @pytest.mark.parametrize(
@@ -39,6 +35,7 @@ def test_a_prompt_beside_the_suite_is_used_and_said(asked):
     [
         ("{% block user %}{{ wrong }}{% endblock %}", "'wrong' is undefined"),
         ("{% block user %}a{% endblock %}{% block sytem %}b{% endblock %}", "mean system?"),
+        ("{# mine #}\nBe short.\n{% block user %}a{% endblock %}", "is outside of the blocks"),
         # Of another track, which has turns.
         ("{% block user %}a{% endblock %}{% block turn %}b{% endblock %}", "that nothing uses"),
     ],

@@ -28,7 +28,7 @@ def prompt(folder, body, **files):
 
 
 def test_blocks_become_messages_with_captioned_pictures_before_the_user_text(tmp_path):
-    blocks = "{% block system %} Be short. {% endblock %} not sent "
+    blocks = "{% block system %} Be short. {% endblock %} {# a note #} "
     blocks += "{% block caption %}{{ number }}. {{ label }}{% endblock %}"
     user = "{% block user %}\n{{ n_candidates }}{% block mine %}!{% endblock %}\n{% endblock %}"
     made = prompt(tmp_path, blocks + user)
@@ -88,7 +88,8 @@ def test_an_edit_of_what_is_included_is_another_prompt(tmp_path_factory, first, 
         ("\n {% if 0 %}a{% endif %}\n", "", "mine.j2", "says nothing"),
         ("{% block sytem %}{% endblock %}{% block user %}a{% endblock %}", "", "mine.j2:1",
          "is a block that nothing uses"),
-        ("{% include 'gone.j2' %}", "", "mine.j2:1", "no such file"),
+        ("{% block user %}a{% endblock %}\nb", "", "mine.j2:2", "is outside of the blocks"),
+        ("{% include 'gone.j2' %}", "", "mine.j2:1", "not a template"),
         ("\n{% include n_candidates %}", "", "mine.j2:2", "in quotes"),
         ("{% include '../mine.j2' %}", "", "mine.j2:1", "not a template"),
         ("{% include '/etc/hostname' %}", "", "mine.j2:1", "not a template"),
@@ -99,7 +100,7 @@ def test_an_edit_of_what_is_included_is_another_prompt(tmp_path_factory, first, 
         ("{% extends 'part.j2' %}{% block user %}{% endblock %}", "", "mine.j2:1", "extend"),
         ("{% include 'part.j2' %}", "a\n\n{{ wrong }}", "part.j2:3", "'wrong' is undefined"),
         ("{% include 'part.j2' %}", "a\n{% if %}", "part.j2:2", "is not valid Jinja"),
-        ("{% include 'part.j2' %}", "\n{% include 'gone.j2' %}", "part.j2:2", "no such file"),
+        ("{% include 'part.j2' %}", "\n{% include 'gone.j2' %}", "part.j2:2", "not a template"),
         ("{% import 'part.j2' as p %}{{ p.f() }}",
          "{% macro f() %}\n{{ 1 // 0 }}{% endmacro %}", "part.j2:2", "division"),
         ("{% include 'part.j2' %}", "{% include 'part.j2' %}", "part.j2:1", "nested too deeply"),
