@@ -131,7 +131,7 @@ def judged(record):
     fields = record.model_dump()
     for turn in fields.get("turns", ()):
         del turn["reply"]
-    own = ("pose", "answer", "ending", "outcomes", "progress", "turns", "question")
+    own = ("pose", "answer", "ending", "outcomes", "turns", "question")
     return {name: fields[name] for name in (*JUDGED, *own) if name in fields}
 
 

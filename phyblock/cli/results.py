@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from phyblock.records.record import Record
 
 _MB = 1e6
-_STYLES = {"plain": "", "good": "green", "bad": "red"}
 _FAILURES = 4
 """Maximum number of messages of failed calls that are shown."""
 
@@ -140,31 +139,18 @@ def _print_summary(summary: Summary) -> None:
 @click.command()
 @run_argument
 @click.argument("sample")
-@click.option(
-    "--gif",
-    type=UserPath(dir_okay=False),
-    metavar="FILE",
-    help="Draw the steps as an animated GIF; needs the data set.",
-)
-@click.option(
-    "--size",
-    type=click.IntRange(128, 1024),
-    default=256,
-    help="Edge of each picture of the GIF [pixels].",
-)
 @data_option
-def show(run: Path, sample: str, gif: Path | None, size: int, data: Path | None) -> None:
+def show(run: Path, sample: str, data: Path | None) -> None:
     """Show SAMPLE of the folder RUN: prompt, reply, parsed answer, and the verdict of each step.
 
     SAMPLE is an id as in records.jsonl (TRACK/MODEL/ITEM/sSEED), or any unique part of it.
     """
-    from phyblock.files import write_named
     from phyblock.records.files import read_manifest
+    from phyblock.registry import known_track
     from phyblock.run.rescore import recorded_dataset
-    from phyblock.tracks.base import as_recorded, kind_of
+    from phyblock.tracks.base import as_recorded
 
     record = _find(run, sample)
-    film = kind_of(record.track).report().film
     console = make_console()
     console.print(record.sample, style="bold")
     facts = [f"scene {record.scene}", f"level {', '.join(map(str, record.levels))}"]
@@ -192,32 +178,23 @@ def show(run: Path, sample: str, gif: Path | None, size: int, data: Path | None)
     if record.is_correct is not None:
         verdict = "right" if record.is_correct else f"wrong: the answer is {record.target}"
         console.print(verdict, style="green" if record.is_correct else "red")
-    task, frames = None, []
-    if film is not None:
-        try:
-            dataset = recorded_dataset(run, read_manifest(run), data)
-            task = as_recorded(dataset.task(record.scene), record)
-            blocks = enumerate(task.candidates.candidates, 1)
-            names = ", ".join(f"{n} {one.color} {one.type}" for n, one in blocks)
-            console.print(f"Candidates: {names}\n", style="dim")
-        except DataError as error:
-            if gif is not None:
-                raise
-            console.print(f"Names of blocks are not shown: {error}\n", style="dim")
-        frames = list(film(record, task))
-    for frame in frames[1:] or frames:
-        note = f" ({frame.note})" if frame.note else ""
-        console.print(one_line(f"{frame.caption}{note}"), style=_STYLES[frame.tone])
-    if gif is None:
+    if (course := record.course("")) is None:
         return
-    if not frames or task is None:
-        raise StoreError(Problem(record.sample, "has no steps to draw", "--gif"))
-    from phyblock.sim.film import episode_gif, episode_images
-    from phyblock.sim.pictures import PictureStyle
-
-    images = episode_images(task.scene, task.candidates, frames, PictureStyle(size))
-    write_named(gif, episode_gif(images))
-    print_path(console, gif)
+    try:
+        dataset = recorded_dataset(run, read_manifest(run), data)
+        task = as_recorded(dataset.task(record.scene), record)
+        blocks = enumerate(task.candidates.candidates, 1)
+        names = ", ".join(f"{n} {one.color} {one.type}" for n, one in blocks)
+        console.print(f"Candidates: {names}\n", style="dim")
+    except DataError as error:
+        console.print(f"Names of blocks are not shown: {error}\n", style="dim")
+    heading = known_track(record.track).report().heading
+    for n, (name, why) in enumerate(course.steps, 1):
+        step = f"block {name}" if name.isdecimal() else name
+        verdict = "right" if why is None else heading(why)
+        console.print(one_line(f"{n}. {step}: {verdict}"), style="red" if why else "green")
+    end = f"{record.n_blocks - course.missing} of {counted(record.n_blocks, 'block')} placed"
+    console.print(end + (f"; ended: {heading(course.ending)}" if course.ending else ""))
 
 
 def _find(run: Path, sample: str) -> Record:

@@ -411,7 +411,7 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
             return self._observation(), 0.0, True, False, self._info()
         self._outcome, reward, is_right = acted
         if self._prompter is not None:
-            self._past.append(PastStep(f"Move({action})", cast(StepOutcome, self._outcome)))
+            self._past.append(PastStep(int(action), cast(StepOutcome, self._outcome)))
         self._failures = 0 if is_right else self._failures + 1
         ended = self._play.has_ended
         cut = self._steps >= self._most_steps or self._failures == self._max_failures

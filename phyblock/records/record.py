@@ -16,6 +16,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field, TypeAdapter, 
 from phyblock.config.suite import Variant
 from phyblock.config.validation import problems_of
 from phyblock.config.yaml import FieldPath, YamlSource
+from phyblock.domain.scene import AssemblyTask, Block
 from phyblock.errors import DataError, InputError, Problem, StoreError
 from phyblock.files import load_json
 from phyblock.text import plain_sum, well_formed
@@ -271,12 +272,13 @@ class Score(Line):
 
 
 class Course(NamedTuple):
-    """An assembly: each step by its named candidate, with its error type (None: right), and the
-    number of goal blocks missing at the end.
+    """An assembly: each step by its named candidate, with its error type (None: right), the number
+    of goal blocks missing at the end, and the ending of an episode.
     """
 
     steps: tuple[tuple[str, str | None], ...]
     missing: int
+    ending: str = ""
 
 
 class AskedTurn(Line):
@@ -392,6 +394,10 @@ class Record(Line):
             return None
         names = (self.said or "").split()
         return Course(tuple(zip(names, score.why or (), strict=False)), score.fn)
+
+    def built(self, _task: AssemblyTask) -> tuple[Block, ...]:
+        """Return the blocks in the world at the end, for its scene as presented."""
+        return ()
 
     @property
     def asked_turns(self) -> tuple[AskedTurn, ...]:

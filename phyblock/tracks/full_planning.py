@@ -18,7 +18,6 @@ from phyblock.parsing.plan import ParsedPlan, parse_plan, plan_form
 from phyblock.parsing.text import READER_VERSION, AnswerForm
 from phyblock.records.record import Line, Record, Score
 from phyblock.scoring.plan import BLOCK_OUTCOMES, ERROR_TYPES, AssemblyScorer, Counts
-from phyblock.sim.film import FilmStep, Tone
 from phyblock.tracks.base import Judgement, SceneTrack, file_plan
 from phyblock.tracks.goal_blind import blind_guesses
 from phyblock.tracks.measures import SampleCounts, level_cells
@@ -58,6 +57,11 @@ class PlanRecord(Record):
     """`full_planning`."""
     parse: PlanParse | None = None
     """The parsed plan."""
+
+    def built(self, task: AssemblyTask) -> tuple[Block, ...]:
+        """Return the blocks that were placed by the headline score."""
+        placed = next((one.placed for one in self.scores if one.placed is not None), ())
+        return tuple(task.scene.blocks[vertex] for vertex in placed if vertex is not None)
 
 
 @dataclass(frozen=True)
@@ -199,26 +203,6 @@ COUNTS = (
 )
 
 
-def _film(record: PlanRecord, task: AssemblyTask | None) -> Iterator[FilmStep]:
-    """Yield each step by the headline score; a wrong step places no block."""
-    yield FilmStep(f"{record.model}, {record.scene}", "plain", None, ())
-    score = next((score for score in record.scores if score.placed is not None), None)
-    if score is None or score.placed is None or score.why is None or record.parse is None:
-        yield FilmStep("no step is known", "bad", None, ())
-        return
-    blocks: tuple[Block, ...] = ()
-    steps = zip(record.parse.plan, score.placed, score.why, strict=True)
-    for n, (candidate, vertex, why) in enumerate(steps, 1):
-        heading = FullPlanning.report().heading
-        outcome = "placed" if vertex is not None else heading("wrong", str(why))
-        if task is not None and vertex is not None:
-            blocks += (task.scene.blocks[vertex],)
-        tone: Tone = "good" if vertex is not None else "bad"
-        yield FilmStep(f"{n}. block {candidate}: {outcome}", tone, candidate, blocks)
-    tone = "good" if score.tp == record.n_blocks else "bad"
-    yield FilmStep(f"{score.tp} of {record.n_blocks} blocks placed", tone, None, blocks)
-
-
 class FullPlanning(SceneTrack):
     """Asks for a whole plan in one reply."""
 
@@ -231,7 +215,7 @@ class FullPlanning(SceneTrack):
     by_hand = staticmethod(pick_plan)
     record = PlanRecord
     counted = COUNTS
-    results: ClassVar = {"cells": level_cells, "film": _film}
+    results: ClassVar = {"cells": level_cells}
     varies = ("prompt", "background", "view", "candidate_order", "layout", "repeats")
 
     def open(self) -> None:

@@ -20,11 +20,9 @@ from phyblock.scoring.plan import mean_of, ratio_of
 if TYPE_CHECKING:
     from phyblock.config.suite import Suite
     from phyblock.data.base import Dataset
-    from phyblock.domain.scene import AssemblyTask
     from phyblock.records.files import Manifest
     from phyblock.records.record import Record
     from phyblock.scoring.plan import Metric
-    from phyblock.sim.film import FilmStep
 
 Way = tuple[str, str, str]
 """Setting, matcher and criterion of a score; "" where there is no choice."""
@@ -223,8 +221,7 @@ class TrackReport:
 
     `part_names` explain `Record.part`. `items`, for tracks about more than scenes, opens the items
     of a run in a folder for its page, and returns the item of a record, with its `question` as
-    shown; it raises DataError for other data than the run's. `film` shows a record step by step: a
-    frame for the start, one per step, and one for the end, without blocks if no task is given.
+    shown; it raises DataError for other data than the run's.
     """
 
     measures: tuple[Measure, ...]
@@ -237,12 +234,14 @@ class TrackReport:
     success: str = ""
     part_names: Mapping[str, str] = field(default_factory=dict)
     items: Callable[[Path, Manifest, Dataset], Callable[[Record], Any | None]] | None = None
-    film: Callable[[Any, AssemblyTask | None], Iterator[FilmStep]] | None = None
 
-    def heading(self, kind: str, name: str) -> str:
-        """Return the heading of the measure `<kind>_<name>`, or the name itself as words."""
+    def heading(self, name: str) -> str:
+        """Return the heading of the measure that counts an error or ending, or its name as words.
+
+        The name of such a measure is `<kind>_<name>`.
+        """
         plain = name.replace("_", " ").capitalize()
-        return next((m.heading for m in self.measures if m.name == f"{kind}_{name}"), plain)
+        return next((m.heading for m in self.measures if m.name.endswith(f"_{name}")), plain)
 
 
 def read_report(

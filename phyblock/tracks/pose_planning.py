@@ -43,7 +43,6 @@ from phyblock.sim.camera import VIEWS
 from phyblock.sim.contact import voxel_iou
 from phyblock.sim.dynamics import ExecutionLimits, execute, execution_physics, groups
 from phyblock.sim.engine import Pose, described_engine
-from phyblock.sim.film import FilmStep, Tone
 from phyblock.sim.geometry import box_height_cm, center_cm, collision_pieces, origin_m, put
 from phyblock.sim.pictures import goal_style
 from phyblock.sim.ruled import kit_key, kit_png, ruled_key, ruled_png, written_style
@@ -53,7 +52,7 @@ from phyblock.tracks.full_planning import PlanParse, PlanSubject, needed_candida
 from phyblock.tracks.measures import SampleCounts, level_cells
 from phyblock.tracks.picking import NumberField, Pick, Picking, candidate_choices
 from phyblock.tracks.pictures import Drawing, picture_style
-from phyblock.types import STEP_ENDS, Matcher, Setting, StepEnd, View
+from phyblock.types import REFUSED_ENDS, STEP_ENDS, Matcher, Setting, StepEnd, View
 
 CARRY_VERSION = 4
 """Version of plan execution and its measurements; increased when the end of a plan may change."""
@@ -193,6 +192,21 @@ class PoseRecord(Record):
         errors = (step.error for step in self.pose.steps)
         blocks = next((score.tp + score.fn for score in self.scores), self.pose.reached)
         return Course(tuple(zip(names, errors, strict=True)), blocks - self.pose.reached)
+
+    def built(self, task: AssemblyTask) -> tuple[Block, ...]:
+        """Return the blocks that were not refused, where they came to rest."""
+        world: dict[int, Block] = {}
+        given = () if self.parse is None else self.parse.steps
+        steps = zip(given, () if self.pose is None else self.pose.steps, strict=False)
+        for n, (one, step) in enumerate(steps, 1):
+            block = put(PoseStep(one.block, one.center_cm), task.candidates)
+            if block is not None and step.end not in REFUSED_ENDS:
+                world[n] = block
+            for rest in step.rests:
+                kind, euler_deg = world[rest.step].type, rest.euler_deg
+                place = origin_m(kind, euler_deg, rest.center_cm)
+                world[rest.step] = replace(world[rest.step], position_m=place, euler_deg=euler_deg)
+        return tuple(world.values())
 
 
 _END = ("end", "moved_cm", "turned_deg", "gap_cm", "overlap_cm", "knocked", "rests")
@@ -474,29 +488,6 @@ COUNTS = (
 )
 
 
-def _film(record: PoseRecord, task: AssemblyTask | None) -> Iterator[FilmStep]:
-    """Yield the empty ground, the world after every step, and how many goal blocks were reached."""
-    yield FilmStep(f"{record.model}, {record.scene}", "plain", None, ())
-    if record.pose is None or record.parse is None:
-        yield FilmStep("no step is known", "bad", None, ())
-        return
-    world: dict[int, Block] = {}
-    for n, (given, step) in enumerate(zip(record.parse.steps, record.pose.steps, strict=True), 1):
-        block = task and put(PoseStep(given.block, given.center_cm), task.candidates)
-        if block and step.end in ("stands", "falls", "knocks_over"):
-            world[n] = block
-        for rest in step.rests if task else ():
-            kind, euler_deg = world[rest.step].type, rest.euler_deg
-            place_m = origin_m(kind, euler_deg, rest.center_cm)
-            world[rest.step] = replace(world[rest.step], position_m=place_m, euler_deg=euler_deg)
-        tone: Tone = "bad" if step.error else "good"
-        caption = f"{n}. block {given.block}: {(step.error or step.end).replace('_', ' ')}"
-        yield FilmStep(caption, tone, given.block, tuple(world.values()))
-    tone = "good" if record.pose.completed else "bad"
-    summary = f"{record.pose.reached} of {record.n_blocks} blocks reached"
-    yield FilmStep(summary, tone, None, tuple(world.values()))
-
-
 class PosePlanning(SceneTrack):
     """Asks for a whole plan with the place of every block, and executes it."""
 
@@ -509,7 +500,7 @@ class PosePlanning(SceneTrack):
     by_hand = staticmethod(pick_poses)
     record = PoseRecord
     counted = COUNTS
-    results: ClassVar = {"cells": level_cells, "film": _film}
+    results: ClassVar = {"cells": level_cells}
     varies = ("prompt", "background", "candidate_order", "repeats")
     simulates = True
     draws = True

@@ -6,7 +6,7 @@ import functools
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import accumulate, takewhile
+from itertools import takewhile
 from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
@@ -22,10 +22,8 @@ from phyblock.scoring.plan import ERROR_TYPES
 from phyblock.scoring.steps import Assembly, MoveOutcome, attempted_counts, placed_counts
 from phyblock.sim.dynamics import DEFAULT_TRIAL, ONE_SETTING, settle
 from phyblock.sim.engine import described_engine
-from phyblock.sim.film import FilmStep, Tone
 from phyblock.sim.pictures import goal_style
 from phyblock.sim.question_pictures import question_key, question_png, state_picture
-from phyblock.text import counted
 from phyblock.tracks.base import ENGINE, Judgement, SceneTrack, file_plan
 from phyblock.tracks.full_planning import POSE_COUNTS, PlanParse, PlanSubject
 from phyblock.tracks.goal_blind import blind_guesses
@@ -115,31 +113,30 @@ class EpisodeRecord(Record):
     """`step_planning`."""
     parse: PlanParse | None = None
     """`plan` holds the moves that were attempted."""
-    max_steps: Whole = 0
-    """Maximum number of steps of the episode."""
-    setting: str = ""
-    """The setting under which a move succeeds."""
     engine: str | None = None
     """The physics engine, with its version; null: nothing was simulated."""
     ending: Ending = "unanswered"
     """The ending."""
     outcomes: tuple[StepOutcome, ...] = ()
     """Outcome of every step."""
-    progress: tuple[Whole, ...] = ()
-    """Blocks placed after every step."""
     turns: tuple[EpisodeTurn, ...] = ()
     """Every request, with its reply and its outcome."""
 
     exported: ClassVar[Mapping[str, tuple[str, str]]] = {"ending": ("string", "ending")}
 
     def course(self, matcher: str) -> Course:
-        """The outcome of every step, which does not depend on the matcher."""
+        """Return the outcome of every step, which does not depend on the matcher."""
         del matcher
         steps = (
             (str(turn.parse.move), None if turn.outcome in ("placed", "done") else turn.outcome)
             for turn in self.turns
         )
-        return Course(tuple(steps), self.n_blocks - (self.progress[-1] if self.progress else 0))
+        return Course(tuple(steps), self.n_blocks - self.outcomes.count("placed"), self.ending)
+
+    def built(self, task: AssemblyTask) -> tuple[Block, ...]:
+        """Return the blocks that were placed."""
+        placed = self.turns[-1].world if self.turns else ()
+        return tuple(task.scene.blocks[vertex] for vertex in placed)
 
     @property
     def asked_turns(self) -> tuple[AskedTurn, ...]:
@@ -259,11 +256,21 @@ _REASONS: Mapping[str, str] = {
 
 @dataclass(frozen=True)
 class PastStep:
-    """A past step: the operation, its outcome, and the named candidate."""
+    """A past step: its operation, a candidate, `Done` or None, and its outcome."""
 
-    operation: str
+    operation: int | str | None
     outcome: StepOutcome
-    move: int | None = None
+
+    @property
+    def move(self) -> int | None:
+        """The named candidate, if any."""
+        return self.operation if isinstance(self.operation, int) else None
+
+    @property
+    def text(self) -> str:
+        """The operation as prompts name it."""
+        named = isinstance(self.operation, int)
+        return f"Move({self.operation})" if named else str(self.operation or "(no operation)")
 
     def report(self, feedback: Feedback) -> str:
         """Return the message to the model about the step."""
@@ -277,7 +284,7 @@ class PastStep:
         return f"it failed, {why}" if why else "it failed, nothing was placed"
 
 
-_LIKELY = PastStep("Move(1)", "placed", 1)
+_LIKELY = PastStep(1, "placed")
 
 STEP_OUTCOMES = ("placed", *ERROR_TYPES, "invalid", "unread", "done")
 """Outcomes of steps in tables; `unread` are replies without a single parsed operation."""
@@ -314,33 +321,6 @@ COUNTS = (
 )
 
 
-def _film(record: EpisodeRecord, task: AssemblyTask | None) -> Iterator[FilmStep]:
-    """Yield the empty ground, every step, including wrong ones, and the ending of the episode."""
-    yield FilmStep(f"{record.model}, {record.scene}", "plain", None, ())
-    blocks, heading = tuple[Block, ...](), StepPlanning.report().heading
-    tones: dict[str, Tone] = {"placed": "good", "done": "plain"}
-    for turn in record.turns:
-        if task is not None:
-            blocks = tuple(task.scene.blocks[vertex] for vertex in turn.world)
-        move, outcome = turn.parse.move, turn.outcome
-        candidate = move if isinstance(move, int) else None
-        operation = f"Move({move})" if candidate is not None else move or "(no operation)"
-        ending = "" if outcome == "done" else f": {heading('step', outcome)}"
-        note = f"{len(turn.world)} of {record.n_blocks} placed"
-        note += f", read by {turn.parse.rule.replace('_', ' ')}" if turn.parse.rule else ""
-        caption, tone = f"{turn.n}. {operation}{ending}", tones.get(turn.outcome, "bad")
-        yield FilmStep(caption, tone, candidate, blocks, note)
-    by = ""
-    if record.ending == "collapsed" and task is not None:
-        blocks = settle(blocks).blocks
-        if record.engine != (now := described_engine()):
-            by = f" (falls in {now}, not {record.engine})"
-    placed = record.progress[-1] if record.progress else 0
-    how = f"{placed} of {counted(record.n_blocks, 'block')} placed; ended: "
-    tone = "good" if record.ending == "completed" else "bad"
-    yield FilmStep(f"{how}{heading('ended', record.ending)}{by}", tone, None, blocks)
-
-
 class StepPlanning(SceneTrack):
     """Asks for one operation after another; see `StepEpisode`."""
 
@@ -354,7 +334,6 @@ class StepPlanning(SceneTrack):
     by_hand = staticmethod(pick_step)
     record = EpisodeRecord
     counted = COUNTS
-    results: ClassVar = {"film": _film}
     varies = ("prompt", "background", "view", "candidate_order", "layout", "repeats")
     plays = True
     simulates = True
@@ -369,11 +348,9 @@ class StepPlanning(SceneTrack):
         self._fallen: dict[tuple[Block, ...], tuple[int, ...]] = {}
 
     def about(self, item: AssemblyTask) -> dict[str, Any]:
-        """Return the maximum number of steps, the physics engine, if any, and the presentation of
-        the scene.
-        """
+        """Return the physics engine, if any, and the presentation of the scene."""
         engine = {} if self.spec.physics == "off" else {"engine": described_engine()}
-        return {"max_steps": self.spec.most_steps(len(item.scene)), **engine, **super().about(item)}
+        return {**engine, **super().about(item)}
 
     def json_form(self, item: AssemblyTask) -> AnswerForm[ParsedMove]:
         """Return the JSON form of an operation."""
@@ -420,7 +397,7 @@ class StepPlanning(SceneTrack):
             "setting": self.accepts,
             "told": reports[-1] if reports else "",
             "history": [
-                {"step": number, "operation": one.operation, "told": report}
+                {"step": number, "operation": one.text, "told": report}
                 for number, (one, report) in enumerate(zip(past, reports, strict=True), 1)
             ],
         }
@@ -466,21 +443,18 @@ class StepEpisode:
         self._seed, self._params, self._fell = seed, params, fell
         self._shop = track.shop if with_messages else None
         self._assembly = Assembly(task.scene, task.candidates, track.accepts, self._spec.gating)
-        self._past: list[PastStep] = []
         self._turns: list[dict[str, Any]] = []
-        self._is_settled = True
 
     async def request(self) -> Request | None:
         """Return the next request, or None when the episode has ended."""
-        if not self._is_settled:
-            await self._settle()
+        await self._settle()
         if self.ending is not None:
             return None
         track, task, assembly = self._track, self._task, self._assembly
         messages: tuple[Message, ...] = ()
         if self._shop is not None:
             drawings = (*track.drawings(task), track.draw_state(task, self._blocks()))
-            messages = track.messages(task, await self._shop.images(drawings), self._past)
+            messages = track.messages(task, await self._shop.images(drawings), self._past())
         subject = StepSubject(
             task.scene,
             task.candidates,
@@ -488,9 +462,9 @@ class StepEpisode:
             assembly.right_moves(),
             assembly.exact_moves(),
             next((step.move for step in self._failed()), None),
-            len(self._past),
+            len(self._turns),
         )
-        turn = len(self._past) + 1
+        turn = len(self._turns) + 1
         return track.asked(task, self._seed, self._params, messages, subject, turn)
 
     def take(self, reply: Reply, prompt: SentPrompt | None = None) -> None:
@@ -513,10 +487,6 @@ class StepEpisode:
         if move is not None:
             turn["swapped"] = [list(pair) for pair in move.swapped]
         self._turns.append({**turn, "world": list(self._assembly.vertices)})
-        operation = "Done" if parsed.is_done else f"Move({parsed.move})"
-        operation = "(no operation)" if parsed.problem else operation
-        self._past.append(PastStep(operation, outcome, parsed.move))
-        self._is_settled = outcome != "placed" or self._spec.physics == "off"
         if self._assembly.is_complete:
             self.ending = "completed"
         else:
@@ -524,25 +494,25 @@ class StepEpisode:
 
     def judgement(self) -> Judgement:
         """Return the fields of the episode; it is parsed if any operation was."""
-        outcomes = [step.outcome for step in self._past]
-        progress = accumulate(outcome == "placed" for outcome in outcomes)
-        plan = [step.move for step in self._past if step.move is not None]
+        outcomes = [turn["outcome"] for turn in self._turns]
+        plan = [step.move for step in self._past() if step.move is not None]
         parse = {"parser": "move", "rule": None, "plan": plan}
         settings = self._track.suite.settings
         fields = {
             "parse": {**parse, "file_plan": file_plan(self._task, plan), "dropped": []},
             "scores": [one for setting in settings for one in self._scores(setting, len(plan))],
-            "setting": self._track.accepts,
             "ending": self.ending or "unanswered",
             "outcomes": outcomes,
-            "progress": [int(count) for count in progress],
             "turns": list(self._turns),
         }
         return Judgement(any(turn["parse"]["problem"] is None for turn in self._turns), fields)
 
+    def _past(self) -> list[PastStep]:
+        return [PastStep(turn["parse"]["move"], turn["outcome"]) for turn in self._turns]
+
     def _failed(self) -> Iterator[PastStep]:
         """Yield the steps since the last one that placed a block, newest first."""
-        return takewhile(lambda step: step.outcome != "placed", reversed(self._past))
+        return takewhile(lambda step: step.outcome != "placed", reversed(self._past()))
 
     def _limit(self) -> Ending | None:
         """Return the first limit of the suite that is reached, or None."""
@@ -551,18 +521,20 @@ class StepEpisode:
         reached: tuple[tuple[Ending, int, int | None], ...] = (
             ("max_repeats", len(list(same)), spec.max_repeats),
             ("max_failures", len(moves), spec.max_failures),
-            ("max_steps", len(self._past), spec.most_steps(len(self._task.scene))),
+            ("max_steps", len(self._turns), spec.most_steps(len(self._task.scene))),
         )
         return next((name for name, n, most in reached if most is not None and n >= most), None)
 
     async def _settle(self) -> None:
-        """Release the assembly; blocks that fall are put back, or end the episode."""
+        """Release the assembly after a step; blocks that fall are put back, or end the episode."""
+        last = self._turns[-1] if self._turns else {}
+        if last.get("outcome") != "placed" or "fallen" in last or self._spec.physics == "off":
+            return
         if self._fell is None:
             fallen = await self._track.fallen(self._blocks())
         else:
             fallen = self._fell.get(tuple(self._assembly.vertices), ())
-        self._is_settled = True
-        self._turns[-1]["fallen"] = list(fallen)
+        last["fallen"] = list(fallen)
         if fallen and self._spec.physics == "strict":
             self.ending = "collapsed"
 
@@ -577,7 +549,7 @@ class StepEpisode:
             fell = next(turn["fallen"] for turn in reversed(self._turns) if turn.get("fallen"))
             on_ground = [v for v in assembly.vertices if scene.blocks[v].order in fell]
         placed = placed_counts(scene, self._task.candidates, setting, assembly.chosen, on_ground)
-        happened = Counter(step.outcome for step in self._past)
+        happened = Counter(turn["outcome"] for turn in self._turns)
         errors = {name: happened[name] for name in ERROR_TYPES}
         for criterion, counts, wrong in (
             ("placed", placed, None),

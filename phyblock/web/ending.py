@@ -18,7 +18,6 @@ from phyblock.results.compare import check_pair, comparable
 from phyblock.results.estimates import Headline
 from phyblock.results.load import load_run
 from phyblock.results.text import number
-from phyblock.sim.film import FilmStep
 from phyblock.sim.pictures import Lookout, PictureStyle, to_png
 from phyblock.text import counted, one_line
 from phyblock.tracks.base import as_recorded, kind_of
@@ -43,12 +42,11 @@ class Ending:
         self._run, self._person = self._runs[0], person
         of_scene = {task.scene.id: task for task in tasks}
         records = [one for one in read_records(folder) if one.model == person]
-        self._films: dict[int, tuple[AssemblyTask, FilmStep]] = {}
-        for n, record in enumerate(records):
-            film, task = kind_of(record.track).report().film, of_scene.get(record.scene)
-            if film is not None and task is not None:
-                *_, last = film(record, as_recorded(task, record))
-                self._films[n] = task, last
+        self._built = {
+            n: (task, record.built(as_recorded(task, record)))
+            for n, record in enumerate(records)
+            if record.is_correct is None and (task := of_scene.get(record.scene)) is not None
+        }
         self._notes: list[str] = []
         tracks = [self._track(name, records) for name in self._run.design.suite.tracks]
         self.shown: Mapping[str, Any] = {
@@ -58,7 +56,7 @@ class Ending:
 
     def picture(self, name: str) -> bytes | None:
         """Return the card, or the goal beside the built structure; None for other names."""
-        if (found := _BUILT.fullmatch(name)) and int(found[1]) in self._films:
+        if (found := _BUILT.fullmatch(name)) and int(found[1]) in self._built:
             return to_png(self._pair(int(found[1])))
         if name != CARD or not self.shown["tracks"]:
             return None
@@ -67,15 +65,15 @@ class Ending:
         about = (
             f"{first['title']}: {first['measure']}, {counted(len(first['rows']), first['item'])}"
         )
-        pair = self._pair(next(iter(self._films))) if self._films else None
+        pair = self._pair(next(iter(self._built))) if self._built else None
         return card_png("Can you build this?", f"{said}\n{about}", pair)
 
     def _pair(self, number: int) -> Image.Image:
         """Return a picture of the goal on the left and the built structure on the right."""
-        task, last = self._films[number]
+        task, built = self._built[number]
         lookout = Lookout(task.scene, PictureStyle(_SIZE_PX))
         pair = Image.new("RGB", (2 * _SIZE_PX + _GAP_PX, _SIZE_PX), "#ffffff")
-        for place, blocks in enumerate((task.scene.blocks, last.blocks)):
+        for place, blocks in enumerate((task.scene.blocks, built)):
             pair.paste(lookout.image(blocks), (place * (_SIZE_PX + _GAP_PX), 0))
         return pair
 
@@ -89,7 +87,7 @@ class Ending:
                 "sample": record.sample,
                 "value": own.get(record.item),
                 "took_s": None if record.reply is None else record.reply.latency_s,
-                "picture": f"built/{n}.png" if n in self._films else None,
+                "picture": f"built/{n}.png" if n in self._built else None,
                 **went(record, self._run.design.matcher),
             }
             for n, record in enumerate(records)

@@ -185,7 +185,6 @@ def test_a_run_begins_in_no_folder_of_another(suite, name, options):
         ("bundle", "run", "--out", ""),
         ("export", "run", "--to", "csv", "--out", ""),
         ("scenes", "render", "phyblock-400", "--out", ""),
-        ("show", "run", "sample", "--gif", ""),
         ("init", ""),
     ],
 )

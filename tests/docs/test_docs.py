@@ -58,7 +58,7 @@ def follow(text, workspace, url=ADDRESS):
 LEFT = {
     "first-model.md": ("my-bench/results/first/report.html",),
     "first-scenes.md": ("mine-set/scenes.jsonl", "pictures", "results/mine-poses/tables"),
-    "paper-tables.md": ("results/comparison", "results/paper/paper", "rocket.gif"),
+    "paper-tables.md": ("results/comparison", "results/paper/paper"),
 }
 """What is there after each tutorial; blocks of agent.md are run with the environment's tests."""
 

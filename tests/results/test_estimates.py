@@ -217,7 +217,6 @@ def test_circular_needs_every_rotation_of_a_seed():
 def episode(model, scene, outcomes, ending, *, seed=0, **fields):
     """Return an episode of a goal of four blocks; p is placed, o overflow, ? unread, d done."""
     names = {"p": "placed", "o": "overflow", "?": "no_move", "d": "done", "i": "invalid"}
-    placed = [outcomes[: n + 1].count("p") for n in range(len(outcomes))]
     right, tried = outcomes.count("p"), sum(letter in "poi" for letter in outcomes)
     scores = [
         {"criterion": kind, "setting": setting, "matcher": None, "errors": None,
@@ -228,7 +227,7 @@ def episode(model, scene, outcomes, ending, *, seed=0, **fields):
     made = record(model, scene, seed, scores, **fields)
     made |= {"sample": f"step_planning/{model}/{scene}/s{seed}", "track": "step_planning"}
     told = [names[letter] for letter in outcomes]
-    return {**made, "ending": ending, "outcomes": told, "progress": placed, "max_steps": 8}
+    return {**made, "ending": ending, "outcomes": told}
 
 
 def episodes(*records, missing="skip"):

@@ -133,7 +133,7 @@ def test_episodes_are_shuffled_and_blind_as_well(workspace):
         assert record["parse"]["file_plan"] == [order[n - 1] for n in plan]
         if record["model"] == "all-candidates":
             assert plan == list(range(1, len(plan) + 1))
-    workspace.does("show", workspace.out, "oracle/t3/s1", "--gif", workspace.root / "x.gif")
+    workspace.does("show", workspace.out, "oracle/t3/s1")
 
 
 def test_blind_baselines_are_scored_beside_models_without_being_named(workspace):

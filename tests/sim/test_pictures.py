@@ -25,7 +25,7 @@ from phyblock.sim import ruled
 from phyblock.sim.backgrounds import GROUNDS
 from phyblock.sim.camera import VIEWS, Window, frame, view_axes
 from phyblock.sim.engine import Pose, quat_xyzw_to_euler_deg
-from phyblock.sim.film import FilmStep, assembly_gif, episode_gif, episode_images
+from phyblock.sim.film import assembly_gif
 from phyblock.sim.pictures import (
     COLOR_RGB,
     LABEL_STRIP,
@@ -347,24 +347,3 @@ def test_an_animation_ends_in_the_goal_and_blocks_are_placed_in_order():
     backward = Scene("backward", (1,), scene.blocks[::-1], ("backward",))
     with pytest.raises(DataError, match="backward"):
         assembly_gif(backward, SMALL)
-
-
-def test_frames_of_an_episode_show_goal_candidates_and_world():
-    blocks = TASK.scene.blocks
-    steps = [
-        FilmStep("placed", "good", 2, blocks[:1]),
-        FilmStep("wrong", "bad", 7, blocks[:1]),
-        FilmStep("no such candidate", "bad", 40, blocks[:1]),
-        FilmStep("done", "plain", None, blocks),
-    ]
-    images = episode_images(TASK.scene, TASK.candidates, steps, SMALL)
-    placed, wrong, invalid, done = (np.asarray(image) for image in images)
-    goal = pixels(goal_png(TASK.scene, SMALL))
-    assert np.array_equal(placed[-128:, :128], goal)
-    assert np.array_equal(done[-128:, -128:], goal)
-    assert np.array_equal(placed[-128:, -128:], wrong[-128:, -128:])
-    changed = np.argwhere((wrong[-128:, 131:259] != invalid[-128:, 131:259]).any(axis=2))
-    # Candidate 7 of the grid of 4 by 4: second row, third column.
-    assert (changed.min(axis=0).tolist(), changed.max(axis=0).tolist()) == ([32, 64], [63, 95])
-    with Image.open(io.BytesIO(episode_gif(images))) as gif:
-        assert (gif.n_frames, gif.size) == (len(steps), images[0].size)

@@ -103,7 +103,6 @@ def test_each_reply_has_its_outcome():
         *("several_moves", "several_moves", "placed", "placed"),
     ]
     assert fields["ending"] == "completed"
-    assert fields["progress"] == [0, 0, 1, 1, 1, 1, 1, 1, 2, 3]
     assert [turn["placed"] for turn in fields["turns"]] == [None, None, 0, *[None] * 5, 1, 2]
     assert fields["turns"][-1]["world"] == [0, 1, 2]
     assert fields["parse"]["plan"] == [6, 3, 1, 99, 3, 1]
@@ -256,7 +255,7 @@ def test_outlines_are_as_many_as_an_episode_can_have():
 
 
 def past(*outcomes):
-    return [PastStep(f"Move({n})", outcome, n) for n, outcome in enumerate(outcomes, 1)]
+    return [PastStep(n, outcome) for n, outcome in enumerate(outcomes, 1)]
 
 
 def text(message):

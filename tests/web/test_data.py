@@ -193,7 +193,7 @@ def test_runs_and_bundles_become_one_folder_the_same_every_time(runs, tmp_path):
         fields = known_records().validate_json(line)
         own = type(fields).model_fields.keys() - Record.model_fields.keys()
         added |= {name for name in own if getattr(fields, name) is not None}
-    assert {"pose", "progress"} <= added <= shown
+    assert {"pose", "ending"} <= added <= shown
     assert not {"prompt", "time", "counts"} & shown
 
 
