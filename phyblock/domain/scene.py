@@ -55,9 +55,7 @@ class AOVGraph:
 
     @functools.cached_property
     def unlocks(self) -> tuple[tuple[int, ...], ...]:
-        """For each vertex, those that directly depend on it; ones that unlock the same vertices are
-        interchangeable when they are ready and equal.
-        """
+        """For each vertex, those that directly depend on it."""
         n = len(self)
         return tuple(tuple(w for w in range(n) if v in self.depends_on[w]) for v in range(n))
 

@@ -151,7 +151,9 @@ class Goal:
         return [v for v, itself, needed in self.ways[index] if needed & free == itself]
 
     def distinct(self, vertices: Sequence[int]) -> list[int]:
-        """The first of each group of vertices that unlock the same blocks."""
+        """The first of each group of vertices that unlock the same blocks: when both are ready, they
+        are interchangeable.
+        """
         if len(vertices) < 2:
             return list(vertices)
         return list({self.graph.unlocks[v]: v for v in reversed(vertices)}.values())
