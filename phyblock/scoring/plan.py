@@ -151,8 +151,8 @@ class Goal:
         return [v for v, itself, needed in self.ways[index] if needed & free == itself]
 
     def distinct(self, vertices: Sequence[int]) -> list[int]:
-        """The first of each group of vertices that unlock the same blocks: when both are ready, they
-        are interchangeable.
+        """The first of each group of vertices that unlock the same blocks: where both are ready,
+        they are interchangeable.
         """
         if len(vertices) < 2:
             return list(vertices)
