@@ -1,4 +1,4 @@
-"""Prompts: blocks become messages, files are included, faults are named, nothing is given away."""
+"""Prompts: blocks become messages, faults are named, nothing is given away."""
 
 import contextlib
 import json
@@ -18,10 +18,8 @@ FACTS = {"pictures": ["goal", "candidates"], "n_candidates": 16, "candidate_scal
 MACROS = "{% macro twice(x) %}{{ x }}{{ x }}{% endmacro %}{% set rules = 'R' %}"
 
 
-def prompt(folder, body, **files):
-    """A template with this block `user`, or with blocks of its own; other files are `NAME.j2`."""
-    for name, text in files.items():
-        (folder / f"{name}.j2").write_text(text, encoding="utf-8")
+def prompt(folder, body):
+    """A template with this block `user`, or with blocks of its own."""
     whole = body if "block" in body else f"{{% block user %}}{body}{{% endblock %}}"
     (folder / "mine.j2").write_text(whole, encoding="utf-8")
     return TemplatePrompt(folder / "mine.j2", "mine")
@@ -43,83 +41,56 @@ def test_blocks_become_messages_with_captioned_pictures_before_the_user_text(tmp
 @pytest.mark.parametrize(
     ("body", "said"),
     [
-        ("a{% include 'rules.j2' %}", "aof 16"),
-        ("{% include ['gone.j2', 'rules.j2'] %}", "of 16"),
-        ("a{% include 'gone.j2' ignore missing %}", "a"),
-        ("{% import 'macros.j2' as m %}{{ m.twice('x') }}{{ m.rules }}", "xxR"),
-        ("{% from 'macros.j2' import twice %}{% block user %}{{ twice('x') }}{% endblock %}", "xx"),
         (MACROS + "{% block user %}{{ twice(rules) }}{% endblock %}", "RR"),
-        ("{% include 'outer.j2' %}", "(of 16)"),
         ("{% for p in pictures %}{{ loop.index }} {{ p }};{% endfor %}", "1 goal;2 candidates;"),
     ],
 )
-def test_parts_are_included_and_imported(tmp_path, body, said):
-    files = {"rules": "of {{ n_candidates }}", "outer": "({% include 'rules.j2' %})"}
-    made = prompt(tmp_path, body, macros=MACROS, **files)
-    for name in (*files, "macros"):
-        # What is edited later is not said.
-        (tmp_path / f"{name}.j2").write_text("new", encoding="utf-8")
-    assert made.messages((), FACTS) == (Message("user", (said,)),)
+def test_blocks_use_loops_and_macros(tmp_path, body, said):
+    assert prompt(tmp_path, body).messages((), FACTS) == (Message("user", (said,)),)
 
 
 @given(first=st.text("ab", max_size=3), second=st.text("ab", max_size=3))
 @settings(max_examples=15)
-def test_an_edit_of_what_is_included_is_another_prompt(tmp_path_factory, first, second):
-    versions = [
-        prompt(
-            tmp_path_factory.mktemp("prompts"),
-            "a{% include 'outer.j2' %}",
-            outer="({% include 'rules.j2' %})",
-            rules=text,
-        ).version
-        for text in (first, second)
-    ]
+def test_an_edit_is_another_prompt(tmp_path_factory, first, second):
+    folder = tmp_path_factory.mktemp("prompts")
+    versions = [prompt(folder, f"x{text}").version for text in (first, second)]
     assert (versions[0] == versions[1]) == (first == second)
 
 
 @pytest.mark.parametrize(
-    ("body", "part", "where", "said"),
+    ("body", "where", "said"),
     [
-        ("\n\n{% if %}", "", "mine.j2:3", "is not valid Jinja"),
-        ("{% block usr %}{% endblock %}", "", "mine.j2", "has no user block"),
-        ("\n{{ goal }}\n", "", "mine.j2:2", "'goal' is undefined"),
-        ("\n\n{{ 1 // 0 }}", "", "mine.j2:3", "division"),
-        ("{{ pictures.__class__ }}", "", "mine.j2:1", "is unsafe"),
-        ("\n {% if 0 %}a{% endif %}\n", "", "mine.j2", "says nothing"),
-        ("{% block sytem %}{% endblock %}{% block user %}a{% endblock %}", "", "mine.j2:1",
+        ("\n\n{% if %}", "mine.j2:3", "is not valid Jinja"),
+        ("{% block usr %}{% endblock %}", "mine.j2", "has no user block"),
+        ("\n{{ goal }}\n", "mine.j2:2", "'goal' is undefined"),
+        ("\n\n{{ 1 // 0 }}", "mine.j2:3", "division"),
+        ("{{ pictures.__class__ }}", "mine.j2:1", "is unsafe"),
+        ("\n {% if 0 %}a{% endif %}\n", "mine.j2", "says nothing"),
+        ("{% block sytem %}{% endblock %}{% block user %}a{% endblock %}", "mine.j2:1",
          "is a block that nothing uses"),
-        ("{% block user %}a{% endblock %}\nb", "", "mine.j2:2", "is outside of the blocks"),
-        ("{% include 'gone.j2' %}", "", "mine.j2:1", "not a template"),
-        ("\n{% include n_candidates %}", "", "mine.j2:2", "in quotes"),
-        ("{% include '../mine.j2' %}", "", "mine.j2:1", "not a template"),
-        ("{% include '/etc/hostname' %}", "", "mine.j2:1", "not a template"),
-        ("{% include 'link.j2' %}", "", "mine.j2:1", "not a template"),
-        ("{% include '.env' %}", "", "mine.j2:1", "not a template"),
-        ("{% include 'keys.txt' %}", "", "mine.j2:1", "not a template"),
-        ("{% include 'inside.j2' %}", "", "mine.j2:1", "not a template"),
-        ("{% extends 'part.j2' %}{% block user %}{% endblock %}", "", "mine.j2:1", "extend"),
-        ("{% include 'part.j2' %}", "a\n\n{{ wrong }}", "part.j2:3", "'wrong' is undefined"),
-        ("{% include 'part.j2' %}", "a\n{% if %}", "part.j2:2", "is not valid Jinja"),
-        ("{% include 'part.j2' %}", "\n{% include 'gone.j2' %}", "part.j2:2", "not a template"),
-        ("{% import 'part.j2' as p %}{{ p.f() }}",
-         "{% macro f() %}\n{{ 1 // 0 }}{% endmacro %}", "part.j2:2", "division"),
-        ("{% include 'part.j2' %}", "{% include 'part.j2' %}", "part.j2:1", "nested too deeply"),
-        ("{% include 'part.j2' %}", "x" * 300_000, "part.j2", "cannot be read"),
-        ("{{ " + "(" * 5_000 + "1" + ")" * 5_000 + " }}", "", "mine.j2", "is not valid Jinja"),
-        ("{{ 1" + " + 1" * 20_000 + " }}", "", "mine.j2", "is not valid Jinja"),
-        ("{{ 0x" + "f" * 10_000 + " }}", "", "mine.j2", "is not valid Jinja"),
+        ("{% block user %}a{% endblock %}\nb", "mine.j2:2", "is outside of the blocks"),
+        ("{% include 'secret.txt' %}", "mine.j2:1", "a prompt is one file"),
+        ("{% include '/etc/hostname' ignore missing %}", "mine.j2:1", "a prompt is one file"),
+        ("\n{% include n_candidates %}", "mine.j2:2", "a prompt is one file"),
+        ("{% import 'mine.j2' as m %}", "mine.j2:1", "a prompt is one file"),
+        ("{% from 'secret.txt' import x %}{% block user %}a{% endblock %}", "mine.j2:1",
+         "a prompt is one file"),
+        ("{% extends 'part.j2' %}{% block user %}{% endblock %}", "mine.j2:1",
+         "a prompt is one file"),
+        ("{% macro f() %}\n{{ 1 // 0 }}{% endmacro %}{% block user %}{{ f() }}{% endblock %}",
+         "mine.j2:2", "division"),
+        ("{% macro f() %}{{ f() }}{% endmacro %}{% block user %}{{ f() }}{% endblock %}",
+         "mine.j2:1", "nested too deeply"),
+        ("x" * 300_000, "mine.j2", "cannot be read"),
+        ("{{ " + "(" * 5_000 + "1" + ")" * 5_000 + " }}", "mine.j2", "is not valid Jinja"),
+        ("{{ 1" + " + 1" * 20_000 + " }}", "mine.j2", "is not valid Jinja"),
+        ("{{ 0x" + "f" * 10_000 + " }}", "mine.j2", "is not valid Jinja"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_is_said_with_file_and_line(tmp_path, body, part, where, said):
+def test_what_is_wrong_is_said_with_file_and_line(tmp_path, body, where, said):
     (tmp_path / "secret.txt").write_text("secret", encoding="utf-8")
-    folder = tmp_path / "prompts"
-    folder.mkdir()
-    for name in (".env", "keys.txt"):
-        (folder / name).write_text("secret", encoding="utf-8")
-    (folder / "inside.j2").symlink_to(".env")
-    (folder / "link.j2").symlink_to(tmp_path / "secret.txt")
     with pytest.raises(PromptError) as caught:
-        prompt(folder, body, part=part).messages((), FACTS)
+        prompt(tmp_path, body).messages((), FACTS)
     (problem,) = caught.value.problems
     assert said in problem.message
     assert where in problem.where
