@@ -56,6 +56,7 @@ Background = Literal["checkerboard", "white", "light-wood", "dark-wood", "concre
 BACKGROUNDS: list[Background] = [*get_args(Background)]
 """Those of the paper, then those that plugins add."""
 PictureName = Literal["goal", "candidates"]
+PictureSource = Literal["render", "dataset"]
 PictureLayout = Literal["composite", "separate"]
 CandidateOrder = Literal["file", "shuffled"]
 """Order in which candidates are numbered and shown."""

@@ -43,7 +43,7 @@ RUNS: dict[str, tuple[str, ...]] = {
     "paper-table1": ("paper-table1", "--set", "dataset.path={official}"),
 }
 
-_SHOWN: dict[str, Any] = {"size_px": 128}
+_SHOWN: dict[str, Any] = {"source": "render", "size_px": 128}
 SUITES: dict[str, dict[str, Any]] = {
     "plans": {},
     "plans-separate": {"images": {**_SHOWN, "layout": "separate", "order": ["candidates", "goal"]}},

@@ -51,6 +51,7 @@ from phyblock.types import (
     MissingPolicy,
     PictureLayout,
     PictureName,
+    PictureSource,
     PlanParser,
     Setting,
     View,
@@ -129,6 +130,9 @@ class DatasetSpec(Section):
 class ImagesSpec(Section):
     """The pictures that a model is shown."""
 
+    source: PictureSource = "render"
+    """render: drawn from the scene. dataset: the official composites, whole or cut into their two
+    halves; a scene without one is an error."""
     layout: PictureLayout = "composite"
     """composite: goal and candidates in one picture. separate: two pictures."""
     order: Annotated[Unique[PictureName], Field(min_length=2, max_length=2)] = (
@@ -423,7 +427,7 @@ class Suite(Section):
         """Yield each broken rule between fields, at the field to change."""
         official, recorded = self.dataset.format == "official", self.models == RECORDED
         as_json, shuffled = self.answer_format == "json_schema", self.candidates.order == "shuffled"
-        official_prompt = self.prompt == "official"
+        official_prompt, own_pictures = self.prompt == "official", self.images.source == "dataset"
         if official and self.dataset.path is None:
             message = "must be the folder of a checkout of the official repository"
             hint = "give it on the command line: --set dataset.path=FOLDER"
@@ -434,9 +438,13 @@ class Suite(Section):
              "only the official data set has recorded replies", other),
             (official_prompt and not official, "prompt",
              "the official prompt is read from an official checkout", other),
+            (own_pictures and not official, "images.source",
+             "only the official data set has its own pictures", other),
             (as_json and recorded, "answer_format", "recorded replies are text", ""),
             (as_json and official_prompt, "answer_format", "the official prompt asks for text", ""),
             (as_json and self.parser == "official", "parser", "this parser reads no JSON", ""),
+            (shuffled and own_pictures, "candidates.order",
+             "the data set's own pictures show the candidates in the order of the file", ""),
             (shuffled and recorded, "candidates.order",
              "recorded replies name candidates by the numbers of the file", ""),
         )  # fmt: skip
@@ -455,6 +463,10 @@ class Suite(Section):
         if len(paths) > 1:
             message = "is varied in a suite of several tracks, each of which has its own"
             yield Fault(message, at=at, key=True, hint="run one track at a time")
+            return
+        if factor in ("background", "view") and self.images.source == "dataset":
+            message = "cannot be varied in the data set's own pictures"
+            yield Fault(message, at=at, key=True, hint="use images.source: render")
             return
         first = self.vary.values(factor)[0]
         for path in paths:

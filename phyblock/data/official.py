@@ -2,6 +2,7 @@
 
     data/SCENEs_400_Goal_Jsons/NNN.json                 goal scenes
     data/SCENEs_400_Cand_Jsons/NNN_16_cand_blocks.json  candidate sets
+    data/SCENEs_400_Goal_and_Cand_Imgs_resized/NNN.png  pictures of both (optional)
     outputs/<model>/NNN.json                            recorded raw replies (optional)
 
 No released file is labelled level 1; the paper's Level-1 columns score the level-2 scenes without
@@ -55,6 +56,7 @@ from phyblock.records.record import Line, decode
 
 _GOALS = Path("data", "SCENEs_400_Goal_Jsons")
 _CANDIDATES = Path("data", "SCENEs_400_Cand_Jsons")
+_PICTURES = Path("data", "SCENEs_400_Goal_and_Cand_Imgs_resized")
 _OUTPUTS = Path("outputs")
 # <IMG_CONTEXT> of InternVL, <|image_pad|> of Qwen, <image> of LLaVA
 _PICTURE_MARKS = re.compile(r"\A(?:\s*<\|?[A-Za-z_]{1,30}\|?>)+")
@@ -110,12 +112,13 @@ def read_official(root: Path) -> Dataset:
     adapter = TypeAdapter(_Goal)
 
     def read(goal: Path) -> AssemblyTask:
-        name = goal.stem
+        name, picture = goal.stem, root / _PICTURES / f"{goal.stem}.png"
         if not re.fullmatch(NAME, name):
             raise DataError(Problem(str(goal), "is not a name", "the file", name, NAME_ALLOWED))
         scene = decode(adapter, read_data(goal), str(goal), _Goal).scene(name)
         path = root / _CANDIDATES / f"{name}_16_cand_blocks.json"
-        return task_of(scene, read_candidates(path), str(path))
+        own = picture if picture.is_file() else None
+        return task_of(scene, read_candidates(path), str(path), own)
 
     tasks = read_each(((str(goal), partial(read, goal)) for goal in goals), lambda task: task.key)
     return Dataset("official", root, tuple(tasks))

@@ -246,7 +246,9 @@ def candidate_set(stored: Sequence[StoredCandidate]) -> CandidateSet:
     return CandidateSet(tuple(one.candidate for one in stored))
 
 
-def task_of(scene: Scene, candidates: CandidateSet, where: str) -> AssemblyTask:
+def task_of(
+    scene: Scene, candidates: CandidateSet, where: str, composite: Path | None = None
+) -> AssemblyTask:
     """Return a scene with its candidates. Raises DataError for a block without a candidate."""
     missing = candidates.missing(scene)
     allowed = "every type, color and orientation that the scene uses"
@@ -257,7 +259,7 @@ def task_of(scene: Scene, candidates: CandidateSet, where: str) -> AssemblyTask:
             found = shown([block.type, block.color, block.euler_deg])
             faults.append(Fault(message, allowed, found, ("candidates",)))
     report(faults, where)
-    return AssemblyTask(scene, candidates)
+    return AssemblyTask(scene, candidates, composite)
 
 
 def read_builtin(folder: Path) -> Dataset:

@@ -6,6 +6,7 @@ import functools
 import graphlib
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -252,12 +253,14 @@ class PoseStep:
 class AssemblyTask:
     """A goal structure with its candidate set.
 
-    If `seed` shuffled the candidates, `candidates` are in the order shown, and `order` has the
-    number of each in the file. The goal is not shown if the task `is_blind`.
+    `composite` is the data set's own picture of both, if it has one. If `seed` shuffled the
+    candidates, `candidates` are in the order shown, and `order` has the number of each in the file.
+    The goal is not shown if the task `is_blind`.
     """
 
     scene: Scene
     candidates: CandidateSet
+    composite: Path | None = None
     order: tuple[int, ...] = ()
     is_blind: bool = False
     seed: int = 0

@@ -341,9 +341,17 @@ class Track(ABC):
 class SceneTrack(Track):
     """A track about scenes; its section may hold `PictureControls`."""
 
+    draws: ClassVar[bool] = False
+    """True if it draws its own pictures and cannot use those of a data set."""
+
     def open(self) -> None:
         """Select scenes evenly over levels."""
-        self.items = select_tasks(self.dataset.tasks, self.suite, self.limit)
+        suite = self.suite
+        self.items = select_tasks(self.dataset.tasks, suite, self.limit)
+        if self.draws and self.shop is not None and suite.images.source == "dataset":
+            where, message = suite.where("images", "source"), f"{self.name} draws its own pictures"
+            hint = "render the pictures: --set images.source=render"
+            raise SpecError(Problem(where, message, "images.source", "dataset", hint=hint))
 
     def draw(self, item: AssemblyTask) -> tuple[Drawing, ...]:
         """Return the pictures of goal and candidates in the style of the suite."""
@@ -361,10 +369,11 @@ class SceneTrack(Track):
 
     def facts(self, item: AssemblyTask, pictures: Sequence[Image]) -> dict[str, object]:
         """Return the variables of templates; none of them reveals the answer."""
+        images = self.suite.images
         return {
             **super().facts(item, pictures),
             "n_candidates": len(item.candidates),
-            "candidate_scale": "common",
+            "candidate_scale": None if images.source == "dataset" else "common",
         }
 
 
@@ -459,7 +468,7 @@ def in_order(
         found, allowed = ", ".join(map(str, numbers)), f"the numbers 1 to {n}, each once"
         raise DataError(Problem(where, message, "shown.order", found, allowed))
     shown = CandidateSet(tuple(task.candidates[number] for number in numbers))
-    return AssemblyTask(task.scene, shown, tuple(numbers), is_blind, seed)
+    return AssemblyTask(task.scene, shown, task.composite, tuple(numbers), is_blind, seed)
 
 
 def as_recorded(task: AssemblyTask, record: Record) -> AssemblyTask:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from phyblock.sim.pictures import GRID_COLUMNS
 
@@ -74,6 +74,11 @@ class Picking:
     write: Callable[[Sequence[Pick]], str]
     fields: tuple[NumberField, ...] = ()
     task: str = ""
+
+    def without_cells(self) -> Picking:
+        """Return the same with choices that are whole pictures."""
+        plain = (one if one.cell is None else Choice(one.name, one.text) for one in self.choices)
+        return replace(self, choices=tuple(plain))
 
     def reply(self, picks: Sequence[Pick]) -> str:
         """Return the reply made of picks.

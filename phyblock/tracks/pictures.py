@@ -16,13 +16,15 @@ from typing import TypeVar
 
 from phyblock.config.suite import ImagesSpec
 from phyblock.domain.scene import AssemblyTask
-from phyblock.errors import DataError, SimulationError
+from phyblock.errors import DataError, Problem, SimulationError
 from phyblock.files import (
     LARGEST_PICTURE_BYTES,
     atomic_write,
     cache_dir,
+    decode_picture,
     picture_size,
     read_bytes,
+    read_picture,
     writing,
 )
 from phyblock.models.request import Image
@@ -35,6 +37,7 @@ from phyblock.sim.pictures import (
     goal_png,
     goal_style,
     joined_size_px,
+    to_png,
 )
 from phyblock.text import hex_digest
 from phyblock.types import BACKGROUNDS
@@ -198,21 +201,47 @@ def picture_style(images: ImagesSpec) -> PictureStyle:
 def scene_drawings(task: AssemblyTask, images: ImagesSpec) -> tuple[Drawing, ...]:
     """Return the goal and the candidates of a scene: one composite, or two pictures.
 
-    A goal that is not shown does not affect the size.
+    They are drawn, or cut out of the data set's own composites. A goal that is not shown does not
+    affect the size. Raises DataError if the data set lacks a picture that it must provide.
     """
-    style = picture_style(images)
-    style = style if task.is_blind else goal_style(task.scene, style)
-    side, key = (style.size_px, style.size_px), candidates_key(task.candidates, style)
-    grid = Drawing("candidates", key, partial(candidates_png, task.candidates, style), side)
+    if images.source == "dataset":
+        if (path := task.composite) is None:
+            message = "the data set has no picture of it"
+            hint = "render the pictures: --set images.source=render"
+            raise DataError(Problem(f"scene {task.scene.id}", message, hint=hint))
+        key, whole = hex_digest(read_picture(path)), partial(read_picture, path)
+        goal, grid = (
+            Drawing(label, key, partial(_half, path, is_goal=label == "goal"), is_file=True)
+            for label in ("goal", "candidates")
+        )
+        both = Drawing("composite", key, whole, is_file=True)
+    else:
+        style = picture_style(images)
+        style = style if task.is_blind else goal_style(task.scene, style)
+        side, key = (style.size_px, style.size_px), goal_key(task.scene, style)
+        goal = Drawing("goal", key, partial(goal_png, task.scene, style), side)
+        key, make = candidates_key(task.candidates, style), partial(candidates_png, task.candidates)
+        grid = Drawing("candidates", key, partial(make, style), side)
+        key = hex_digest(f"composite {goal.key} {grid.key}")
+        join = partial(_joined, goal.make, grid.make)
+        both = Drawing("composite", key, join, joined_size_px(style.size_px))
     if task.is_blind:
         return (grid,)
-    key = goal_key(task.scene, style)
-    goal = Drawing("goal", key, partial(goal_png, task.scene, style), side)
-    if images.layout == "separate":
-        return (goal, grid) if images.order[0] == "goal" else (grid, goal)
-    key, join = hex_digest(f"composite {goal.key} {grid.key}"), partial(_joined, goal, grid)
-    return (Drawing("composite", key, join, joined_size_px(style.size_px)),)
+    if images.layout == "composite":
+        return (both,)
+    return (goal, grid) if images.order[0] == "goal" else (grid, goal)
 
 
-def _joined(goal: Drawing, grid: Drawing) -> bytes:
-    return composite_png(goal.make(), grid.make())
+def _joined(make_goal: Callable[[], bytes], make_grid: Callable[[], bytes]) -> bytes:
+    return composite_png(make_goal(), make_grid())
+
+
+def _half(composite: Path, *, is_goal: bool) -> bytes:
+    """Return goal or candidates cut out of a 2:1 composite: two squares, with a gap between."""
+    with decode_picture(read_picture(composite), str(composite)) as picture:
+        # PNG has no CMYK, which JPEG files may use.
+        picture = picture.convert("RGB") if picture.mode == "CMYK" else picture
+        width, height = picture.size
+        side = width // 2 - width // 256
+        left = 0 if is_goal else width - side
+        return to_png(picture.crop((left, 0, left + side, height)))

@@ -503,6 +503,7 @@ class PosePlanning(SceneTrack):
     results: ClassVar = {"cells": level_cells}
     varies = ("prompt", "background", "candidate_order", "repeats")
     simulates = True
+    draws = True
     spec: PoseSpec
 
     def draw(self, item: AssemblyTask) -> tuple[Drawing, ...]:

@@ -337,6 +337,7 @@ class StepPlanning(SceneTrack):
     varies = ("prompt", "background", "view", "candidate_order", "layout", "repeats")
     plays = True
     simulates = True
+    draws = True
     spec: StepsSpec
 
     def open(self) -> None:

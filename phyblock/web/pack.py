@@ -339,7 +339,8 @@ class SentPictures:
 
     @cached_property
     def _paths(self) -> dict[str, Path]:
-        paths = (cache_dir() / "pictures").glob("*/*.png")
+        own = (task.composite for task in self._sources.tasks.values())
+        paths = [*(cache_dir() / "pictures").glob("*/*.png"), *(path for path in own if path)]
         return {digest_of_file(path): path for path in paths}
 
     def name(self, digest: str) -> str | None:

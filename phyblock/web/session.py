@@ -112,6 +112,9 @@ class PersonModel:
         by_hand = kind_of(request.track).by_hand
         assert by_hand is not None, "a plan has only tracks that can be answered by hand"
         picking = by_hand(request.subject)
+        if self._plan.suite.images.source != "render":
+            # The grids in a data set's own pictures are unknown.
+            picking = picking.without_cells()
         text, took_s = await self._session.ask(request, picking, is_warm_up=is_warm_up)
         return Reply(
             text=text,

@@ -16,7 +16,7 @@ from PIL import Image as PillowImage
 
 from phyblock.cli.main import show_problems
 from phyblock.errors import InputError, Problem
-from tests.data.broken import with_value
+from tests.data.broken import sound_scene, with_value, write_checkout
 from tests.fuzz.strategies import png_header
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
@@ -144,18 +144,17 @@ def noise(name, *args):
     return file(name, bytes(range(256)) * 40_000, *args)
 
 
-def asked_about(picture):
-    """A question about a picture of its own, in the official layout."""
+def checkout(picture):
+    """A checkout of the official layout with one picture, or none."""
 
     def prepare(workspace):
-        folder = workspace.root / "asked"
-        (folder / "images").mkdir(parents=True)
-        (folder / "images" / "t1.png").write_bytes(picture)
-        options = ["1", "2", "3", "4"]
-        asked = {"scene_id": "t1", "question": "How many?", "options": options, "answer": "A"}
-        (folder / "OC.json").write_text(json.dumps([asked]), encoding="utf-8")
-        vqa = {"format": "official", "path": "./asked"}
-        workspace.write_suite(tracks=["vqa"], vqa=vqa, models=["alpha"])
+        root = write_checkout(workspace.root / "official", {**sound_scene(), "id": "000"})
+        if picture is not None:
+            folder = root / "data" / "SCENEs_400_Goal_and_Cand_Imgs_resized"
+            folder.mkdir()
+            (folder / "000.png").write_bytes(picture)
+        official = {"format": "official", "path": "official"}
+        workspace.write_suite(dataset=official, images={"source": "dataset"}, models=["alpha"])
         return FRESH
 
     return prepare
@@ -340,17 +339,20 @@ DATA = (
     Bad("twice", scenes_text(lambda lines: [*lines, lines[0]]),
         ("scenes.jsonl:6: id", "scenes.jsonl:1 already")),
     Bad("none", scenes_text(lambda _: []), ("scenes.jsonl", "holds no scenes")),
-    Bad("bad-png", asked_about(b"no picture"), ("t1.png", "is not a picture")),
-    Bad("eps", asked_about(EPS), ("t1.png", "is not a picture", "PNG, JPEG, GIF or WebP")),
-    Bad("dot-png", asked_about(png((1, 1))), ("t1.png", "found: 1 x 1 pixels", "10,000 pixels")),
-    Bad("huge-png", asked_about(png_header(30_000, 30_000)), ("t1.png", "900000000 pixels")),
-    Bad("cut-png", asked_about(png()[:-40]), ("t1.png", "is not a readable picture")),
+    Bad("no-png", checkout(None), ("official", "images.source", "found: 000", "render")),
+    Bad("bad-png", checkout(b"no picture"), ("000.png", "is not a picture")),
+    Bad("eps", checkout(EPS), ("000.png", "is not a picture", "PNG, JPEG, GIF or WebP")),
+    Bad("dot-png", checkout(png((1, 1))), ("000.png", "found: 1 x 1 pixels", "10,000 pixels")),
+    Bad("huge-png", checkout(png_header(30_000, 30_000)), ("000.png", "900000000 pixels")),
+    Bad("cut-png", checkout(png()[:-40]), ("000.png", "is not a readable picture")),
 )  # fmt: skip
 MODELS = (
     Bad("no-rule", options("--models", "repeat"), ("repeat", "has no rule for full_planning")),
     Bad("engine", command(*FRESH, "--models", "random", "--set", "tracks=[step_planning]"),
         ("PHYBLOCK_PHYSICS: is not known", "found: bullet", "allowed: "),
         env=(("PHYBLOCK_PHYSICS", "bullet"),)),
+    Bad("drawn-goal", lambda here: [*checkout(png())(here), "--set", "tracks=[step_planning]"],
+        ("step_planning draws its own pictures", "images.source=render")),
     Bad("two-addresses",
         file("models.yaml", "".join(
             f"{name}: {{id: hosted_vllm/m, api_base: 'http://127.0.0.1:{port}/v1'}}\n"

@@ -50,17 +50,20 @@ def test_both_formats_say_the_same_and_what_only_official_files_have_is_read(tmp
     assert official.tasks == read_builtin(write_scenes(tmp_path, SCENE)).tasks
     assert official.name == "official"
     (task,) = official.tasks
-    assert (task.scene.look_at_m, task.scene.parents) == (None, ("s1",))
+    assert (task.scene.look_at_m, task.composite, task.scene.parents) == (None, None, ("s1",))
     # A level-2 scene counts in level 1 too; declared layers are taken as they are.
     for field, value in (
         *(("level", 2), ("combined", "080_092"), ("lookat_pos", [0, 0, 0.1])),
         ("blocks.1.layer", 5),
     ):
         change(goal_path(tmp_path), field, value)
+    picture = tmp_path / "data" / "SCENEs_400_Goal_and_Cand_Imgs_resized" / "s1.png"
+    picture.parent.mkdir()
+    picture.write_bytes(b"")
     (task,) = read_official(tmp_path).tasks
     scene = task.scene
     assert (scene.levels, scene.level, scene.parents) == ((1, 2), 2, ("080", "092"))
-    assert scene.look_at_m == (0, 0, 0.1)
+    assert (scene.look_at_m, task.composite) == ((0, 0, 0.1), picture)
     assert (scene.blocks[1].layer, scene.graph.layers) == (5, (1, 2))
 
 

@@ -139,6 +139,7 @@ def _numbers(low: float, high: float) -> st.SearchStrategy[float]:
 
 SECTIONS: dict[str, dict[str, st.SearchStrategy[Any]]] = {
     "images": {
+        "source": st.just("render"),
         "layout": st.sampled_from(["composite", "separate"]),
         "order": st.permutations(["goal", "candidates"]),
         "size_px": st.integers(128, 2048),

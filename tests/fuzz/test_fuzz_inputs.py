@@ -140,22 +140,17 @@ _REPLY_FILES = broken(st.just(_SOUND_REPLY), JSON_TOKENS) | st.builds(
 
 
 def _official(picture, candidates):
-    """A scene in the official layout, maybe with broken candidates, and a question with a picture
-    of its own about it.
-    """
+    """A checkout in the official layout with one picture and maybe broken candidates."""
     scene = {**sound_scene(), "id": "000"}
     goal = {"level": 2, "blocks": scene["blocks"]}
     numbered = [{**entry, "position": n} for n, entry in enumerate(scene["candidates"], 1)]
-    asked = {"scene_id": "000", "question": "?", "options": [*"1234"], "answer": "A"}
     folder = "official/data/SCENEs_400_"
     files = {
         f"{folder}Goal_Jsons/000.json": json.dumps(goal).encode(),
         f"{folder}Cand_Jsons/000_16_cand_blocks.json": candidates or json.dumps(numbered).encode(),
-        "asked/OC.json": json.dumps([asked]).encode(),
-        "asked/images/000.png": picture,
+        f"{folder}Goal_and_Cand_Imgs_resized/000.png": picture,
     }
-    sets = ("dataset.format=official", "dataset.path=official", "tracks=[vqa]")
-    sets += ("vqa.format=official", "vqa.path=./asked")
+    sets = ("dataset.format=official", "dataset.path=official", "images.source=dataset")
     return Case((*RUN, *_sets(sets)), files, ("fresh",))
 
 

@@ -2,20 +2,24 @@
 
 import asyncio
 import io
+from dataclasses import replace
 
 import pytest
 from PIL import Image as PillowImage
 
 from phyblock.config.suite import ImagesSpec
-from phyblock.errors import StoreError
+from phyblock.domain.scene import AssemblyTask
+from phyblock.errors import DataError, StoreError
 from phyblock.sim.pictures import candidates_png
 from phyblock.tracks.base import presented
 from phyblock.tracks.pictures import Workshop, picture_style, scene_drawings
 from tests.fuzz.strategies import png_header
+from tests.shipped import official_tasks
 
 COMPOSITE = ImagesSpec(size_px=128)
 GOAL_FIRST = ImagesSpec(size_px=128, layout="separate")
 GOAL_LAST = ImagesSpec(size_px=128, layout="separate", order=("candidates", "goal"))
+OWN = ImagesSpec(source="dataset")
 
 
 def draw(folder, images, tasks):
@@ -92,6 +96,50 @@ def test_pictures_follow_what_is_shown(tasks, layout, shop):
         ["composite"] if layout == "composite" else ["goal", "candidates"]
     )
     assert keys(images, tasks[0]) != keys(images, blind)
+
+
+@pytest.fixture
+def composite_task(tasks, tmp_path):
+    """A task with a picture of its own: a red half, a gap, a blue half."""
+    picture = PillowImage.new("RGB", (514, 256), "white")
+    picture.paste("red", (0, 0, 255, 256))
+    picture.paste("blue", (259, 0, 514, 256))
+    path = tmp_path / "own.png"
+    picture.save(path)
+    return AssemblyTask(tasks[0].scene, tasks[0].candidates, path)
+
+
+@pytest.mark.parametrize("order", [("goal", "candidates"), ("candidates", "goal")])
+def test_the_data_sets_picture_is_sent_byte_for_byte_or_parted_in_two_halves(
+    composite_task, tmp_path, order
+):
+    (((picture,),), drawn) = draw(tmp_path / "cache", OWN, [composite_task])
+    assert picture.data == composite_task.composite.read_bytes()
+    assert (picture.label, picture.width_px, picture.height_px, drawn) == ("composite", 514, 256, 0)
+    apart = ImagesSpec(source="dataset", layout="separate", order=order)
+    ((pair,), _) = draw(tmp_path / "cache", apart, [composite_task])
+    assert tuple(picture.label for picture in pair) == order
+    colors = {"goal": (255, 0, 0), "candidates": (0, 0, 255)}
+    for picture in pair:
+        assert opened(picture).getcolors() == [(255 * 256, colors[picture.label])]
+    before = keys(OWN, composite_task)
+    PillowImage.new("RGB", (514, 256), "green").save(composite_task.composite)
+    assert keys(OWN, composite_task) != before
+    with pytest.raises(DataError, match="has no picture of it"):
+        draw(tmp_path, OWN, [replace(composite_task, composite=None)])
+
+
+def test_pictures_of_the_data_set_can_leave_out_the_goal(official_checkout):
+    pool = [one for one in official_tasks(official_checkout) if one.composite is not None]
+    task = pool[0]
+    blind = presented(task, 0, "file", is_blind=True)
+    separate = ImagesSpec(source="dataset", layout="separate")
+
+    def sent(images, task):
+        return asyncio.run(Workshop(1).images(scene_drawings(task, images)))
+
+    _, grid = sent(separate, task)
+    assert sent(separate, blind) == sent(OWN, blind) == (grid,)
 
 
 @pytest.mark.parametrize("size", [(30_000, 30_000), (1, 1), (0, 9)])
