@@ -1,9 +1,8 @@
 """Requests in a provider's batches: slower, cheaper if the provider says so, never sent twice.
 
 A request waits in the draft of a batch, which is sent when no more come, or in the newest batch
-that the ledger has it in. If a command is killed between the call that creates a batch and writing
-its id, the next one looks for the batch under phyblock's name for it or, if the provider reports no
-names, among the batches of that time and size, by the names of requests in their answers.
+that the ledger has it in. If it is not known whether a batch was created, since the command was
+killed or the connection lost meanwhile, the model is stopped until a person has looked it up.
 """
 
 from __future__ import annotations
@@ -35,12 +34,7 @@ T = TypeVar("T")
 _FIRST_PAUSE_S = 5.0
 _QUIET_S = 30.0
 """Time after which a draft that gets no more requests is sent, even if more were expected [s]."""
-_CLOCKS_APART_S = 3600.0
 _TIME = "%Y-%m-%dT%H:%M:%SZ"
-
-
-class UnsureError(UnavailableError):
-    """It is unknown if the provider has a batch."""
 
 
 @dataclass(frozen=True)
@@ -146,6 +140,9 @@ class BatchModel:
         self._is_writing = False
         self._draft: Batch | None = None
         self._refusal: UnavailableError | None = None
+        for batch in self._batches:
+            if batch.event == "intended":
+                self._refusal = self._unsure(batch, "the command ended meanwhile")
         self._given: set[str] = set()
         self._billed_usd: dict[str, float] = {}
 
@@ -270,8 +267,8 @@ class BatchModel:
     # A batch from its draft to its answers.
 
     async def _take_through(self, batch: Batch) -> None:
-        """Send a complete draft, or find a batch that an earlier command was sending; then wait for
-        the answers. A lost or refused batch ends without answers.
+        """Send a complete draft, and wait for the answers of a batch. A lost or refused batch ends
+        without answers.
         """
         short_s = min(1.0, 4 * self.files.poll_s)
         if batch.event is None:
@@ -286,14 +283,8 @@ class BatchModel:
             except asyncio.CancelledError:
                 await sending
                 raise
-        elif batch.event == "intended":
-            # The provider may still be processing a call that was cut off.
-            status = await self._find(batch, time.time() + 2 * self.files.poll_s)
-            if status is None:
-                await self._note(batch, "lost", words="not found at the provider")
-                self._settle_all(batch, 0.0)
-            else:
-                await self._note(batch, "created", id=status.id)
+        elif batch.event == "intended" and self._refusal is not None:
+            raise self._refusal
         path = self.files.answers(batch.token)
         if batch.event == "created":
             lines = await self._answered(batch, path)
@@ -314,24 +305,12 @@ class BatchModel:
         """Send a draft; if that fails, nothing more is sent."""
         costs = [] if None in batch.most_usd.values() else list(batch.most_usd.values())
         await self._note(batch, "intended", keys=tuple(batch.most_usd), most_usd=costs)
-
-        async def create() -> BatchStatus:
-            try:
-                return await self._provider.create(batch.token, batch.lines)
-            except RetryableError as error:
-                if error.sent == "no" or error.status == 429:
-                    raise
-                if (known := await self._find(batch, time.time() + self.files.poll_s)) is None:
-                    raise
-                return known
-
         try:
-            status = await self._patiently(create)
-        except UnsureError as error:
-            # The next command finds the batch, if it exists.
-            self._refusal = error
-            raise
+            status = await self._patiently(partial(self._provider.create, batch.token, batch.lines))
         except UnavailableError as error:
+            if error.sent == "maybe":
+                self._refusal = self._unsure(batch, str(error))
+                raise self._refusal from None
             why = f"a batch could not be sent: {error}"
             self._refusal = UnavailableError(why, status=error.status, sent=error.sent)
             self._settle_all(batch, 0.0)
@@ -341,41 +320,26 @@ class BatchModel:
         batch.lines.clear()
         self._say(f"sent batch {batch.shown} of {len(batch.most_usd):,}")
 
-    async def _find(self, batch: Batch, until_s: float) -> BatchStatus | None:
-        """Return the batch that was being sent, or None if there is none; raises UnsureError."""
-        strangers = {one.id for one in self._batches}
-        since_s = batch.created.timestamp() - _CLOCKS_APART_S
-        try:
-            while True:
-                found = await self._patiently(partial(self._provider.listed, since_s))
-                if (ours := [one for one in found if one.token == batch.token]) != []:
-                    return ours[0]
-                is_running = False
-                for status in found:
-                    is_like = status.token is None and status.total in (0, len(batch.most_usd))
-                    if not is_like or status.id in strangers or status.state == "refused":
-                        continue
-                    if status.state == "running":
-                        is_running = True
-                        continue
-                    lines = await self._patiently(partial(self._provider.results, status))
-                    if answers_of(lines, self._provider, batch):
-                        return status
-                    strangers.add(status.id)
-                if not is_running and time.time() >= until_s:
-                    return None
-                await asyncio.sleep(self.files.poll_s)
-        except UnavailableError as error:
-            why = (
-                f"it is not known whether a batch was sent: {error}. If it was not, remove the "
-                f"lines of {batch.token} from {BATCHES}: its requests are then sent again"
-            )
-            raise UnsureError(why, status=error.status, sent=error.sent) from None
+    def _unsure(self, batch: Batch, why: str) -> UnavailableError:
+        """Return the error of a batch that may exist: it needs a person, who looks it up."""
+        known = {"batch": batch.token, "model": self.name, "event": "created", "id": "ID"}
+        line = BatchLine.model_validate({**known, "time": batch.created.strftime(_TIME)})
+        return UnavailableError(
+            f"it is not known whether batch {batch.token} was created: {why}. Look for this name "
+            f"in the batches of your account ({self._provider.named_in}). If it is there, add this "
+            f"line with the batch's id to {BATCHES}: {line.as_json()} "
+            f"If not, remove the lines of {batch.token}: its requests are then sent again",
+            sent="no",
+        )
 
     async def _patiently(self, call: Callable[[], Awaitable[T]]) -> T:
         """Call until it succeeds or cannot. Raises UnavailableError if it never does."""
+
+        def on_retry(error: RetryableError, wait_s: float) -> None:
+            self.report(ModelEvent(self.name, "retry", str(error), wait_s))
+
         try:
-            async for attempt in self.policy.retrying(lambda *_: None):
+            async for attempt in self.policy.retrying(on_retry):
                 with attempt:
                     return await call()
         except UnavailableError:
@@ -409,23 +373,16 @@ class BatchModel:
 
     async def _last_status(self, batch: Batch) -> BatchStatus:
         """Poll a batch until it has ended; return its last state."""
-        pause_s, failures, logged = min(_FIRST_PAUSE_S, self.files.poll_s), 0, ""
+        pause_s, logged = min(_FIRST_PAUSE_S, self.files.poll_s), ""
         while True:
-            try:
-                status = await self._provider.status(batch.id)
-                failures, said = 0, status.words
-                if status.state != "running":
-                    self._say(f"batch {batch.shown} has ended: {said}")
-                    return status
-            except RetryableError as error:
-                failures += 1
-                if failures >= self.policy.attempts:
-                    raise
-                said = f"cannot be looked at now ({error})"
-            if said != logged:
+            status = await self._patiently(partial(self._provider.status, batch.id))
+            if status.state != "running":
+                self._say(f"batch {batch.shown} has ended: {status.words}")
+                return status
+            if status.words != logged:
+                logged = status.words
                 since = batch.created.astimezone().strftime("%d %b %H:%M")
-                self._say(f"waiting for batch {batch.shown} since {since}: {said}")
-                logged = said
+                self._say(f"waiting for batch {batch.shown} since {since}: {logged}")
             await asyncio.sleep(pause_s)
             pause_s = min(self.files.poll_s, 1.5 * pause_s)
 

@@ -14,12 +14,11 @@ import json
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import datetime
 from typing import Any, ClassVar, Literal, TypeVar
 from urllib.parse import urlsplit
 
 from phyblock.config.models import ModelConfig, host_of
-from phyblock.errors import ModelError, UnavailableError
+from phyblock.errors import ModelError, RetryableError, UnavailableError
 from phyblock.files import load_json
 from phyblock.models.client import OPENAI_API_BASE, Answer, HttpClient, error_of, malformed, shown
 from phyblock.models.keys import api_key, hidden, secrets_of
@@ -42,39 +41,32 @@ class BatchStatus:
 
     No request of a `refused` batch was answered; a `cancelled` one may lack some answers. `words`
     are the provider's message, with counts and errors; `results` are the addresses of the answers.
-    `token` is phyblock's name for it, None if the provider does not report it. `total` is the
-    number of requests, 0 if not reported; `created_s` is a Unix time.
     """
 
     id: str
     state: Literal["running", "ended", "cancelled", "refused"]
     words: str
     results: tuple[str, ...]
-    token: str | None
-    total: int
-    created_s: float
 
 
 class BatchProvider(ABC):
-    """One provider's batches: `create`, `status`, `results`, and `listed` to find one again.
+    """One provider's batches: `create`, `status` and `results`.
 
     Methods raise ModelErrors, which contain no key. Everything is sent with `headers`, in which the
-    model's key is inserted, and only to the model's server. A batch is at `url` and its id, the
-    list at `first_page`. The limits are below those of each provider, since a batch is kept in
-    memory.
+    model's key is inserted, and only to the model's server. A batch is at `url` and its id;
+    `named_in` says where the provider shows phyblock's name for it. The limits are below those of
+    each provider, since a batch is kept in memory.
     """
 
     most_requests = 50_000
     most_bytes = 100 * 1000**2
     headers: ClassVar[Mapping[str, str]]
-    after = "after"
-    """Parameter of the list's pages."""
+    named_in: ClassVar[str]
 
-    def __init__(self, config: ModelConfig, base: str, url: str, first_page: str) -> None:
+    def __init__(self, config: ModelConfig, base: str, url: str) -> None:
         self._config = config
         self._base = base
         self._url = url
-        self._first_page = first_page
         self._secrets = secrets_of(config)
         self._looks = HttpClient(_LOOK_S)
         self._transfers = HttpClient(_TRANSFER_S, _LARGEST_RESULTS_BYTES)
@@ -84,26 +76,24 @@ class BatchProvider(ABC):
         """Return the line of a request from the body and headers of a direct call."""
 
     async def create(self, token: str, lines: Sequence[bytes]) -> BatchStatus:
-        """Create a batch. After an error other than `sent="no"`, it may exist all the same."""
+        """Create a batch. Raises UnavailableError with `sent="maybe"` if it may exist all the same,
+        so that creating it again could be paid twice.
+        """
         try:
             post = await self._prepare(token, lines)
         except ModelError as error:
             error.sent = "no"
             raise
-        return await self._call(self._status_in, *post)
+        try:
+            return await self._call(self._status_in, *post)
+        except RetryableError as error:
+            if error.sent == "no" or error.status == 429:
+                raise
+            raise UnavailableError(str(error), status=error.status, sent="maybe") from None
 
     async def status(self, batch_id: str) -> BatchStatus:
         """Return the current state of a batch."""
         return await self._call(self._status_in, f"{self._url}/{batch_id}")
-
-    async def listed(self, since_s: float) -> list[BatchStatus]:
-        """Return the batches of the account since a time, newest first."""
-        found: list[BatchStatus] = []
-        url = self._first_page
-        while url and (not found or found[-1].created_s >= since_s):
-            batches, url = await self._call(lambda answer: self._read_page(_object(answer)), url)
-            found += batches
-        return [status for status in found if status.created_s >= since_s]
 
     async def results(self, status: BatchStatus) -> bytes:
         """Return the lines of a batch's results, without keys."""
@@ -133,36 +123,16 @@ class BatchProvider(ABC):
     def _read_status(self, batch: Any) -> BatchStatus:
         """Read the provider's description of a batch; raises one of UNREADABLE."""
 
-    def _read_page(self, page: Any) -> tuple[list[BatchStatus], str]:
-        """Return the batches on a page of the list, and the address of the next one or ""."""
-        batches = [self._read_status(batch) for batch in page["data"]]
-        more = page.get("has_more") and batches
-        return batches, f"{self._first_page}&{self.after}={batches[-1].id}" if more else ""
-
     def _status(
-        self,
-        name: Any,
-        state: Any,
-        words: Sequence[Any],
-        results: Sequence[str] = (),
-        *,
-        token: str | None = None,
-        total: Any = 0,
-        created: str | float | None = None,
+        self, name: Any, state: Any, words: Sequence[Any], results: Sequence[str] = ()
     ) -> BatchStatus:
-        """Return a status; `words` are a state, the number of answered requests, and errors. A
-        batch of unknown age counts as new.
-        """
+        """Return a status; `words` are a state, the number of answered requests, and errors."""
         if not (isinstance(name, str) and name):
             raise ValueError("a batch without a name")
         word, answered, errors = words
         said = "; ".join(f"{error.get('code')} {error.get('message')}" for error in errors or ())
         text = f"{word}, {answered or 0} answered{': ' if said else ''}{said}"
-        if isinstance(created, str):
-            created = datetime.fromisoformat(created).timestamp()
-        created_s = float("inf") if created is None else float(created)
-        text = shown(text, self._secrets)
-        return BatchStatus(name, state, text, tuple(results), token, int(total or 0), created_s)
+        return BatchStatus(name, state, shown(text, self._secrets), tuple(results))
 
     async def _call(
         self,
@@ -202,10 +172,11 @@ class _OpenAI(BatchProvider):
     """`{api_base}/files` and `{api_base}/batches`, of OpenAI and servers that have both."""
 
     headers: ClassVar[Mapping[str, str]] = {"Authorization": "Bearer {key}"}
+    named_in = "in its metadata"
 
     def __init__(self, config: ModelConfig) -> None:
         base = (config.api_base or OPENAI_API_BASE).rstrip("/")
-        super().__init__(config, base, f"{base}/batches", f"{base}/batches?limit=100")
+        super().__init__(config, base, f"{base}/batches")
 
     def line(self, custom_id: str, body: bytes, headers: Mapping[str, str]) -> bytes:  # noqa: ARG002
         fields = {"custom_id": custom_id, "method": "POST", "url": "/v1/chat/completions"}
@@ -247,9 +218,6 @@ class _OpenAI(BatchProvider):
             "ended" if word == "completed" and files else ends.get(word, "running"),
             (word, counts.get("completed"), (batch.get("errors") or {}).get("data")),
             [f"{self._base}/files/{file}/content" for file in files],
-            token=(batch.get("metadata") or {}).get("phyblock"),
-            total=counts.get("total"),
-            created=batch.get("created_at"),
         )
 
 
@@ -257,14 +225,13 @@ class _Anthropic(BatchProvider):
     """`/v1/messages/batches`, where batches cannot have names."""
 
     headers: ClassVar[Mapping[str, str]] = {"anthropic-version": "2023-06-01", "x-api-key": "{key}"}
-    after = "after_id"
+    named_in = "in the custom_id of its results"
 
     def __init__(self, config: ModelConfig) -> None:
         base = (config.api_base or "https://api.anthropic.com").rstrip("/")
         # As in litellm, the address may include the path of messages or not.
         base = base.removesuffix("/messages").removesuffix("/v1")
-        url = f"{base}/v1/messages/batches"
-        super().__init__(config, base, url, f"{url}?limit=100")
+        super().__init__(config, base, f"{base}/v1/messages/batches")
         self._betas: set[str] = set()
 
     def line(self, custom_id: str, body: bytes, headers: Mapping[str, str]) -> bytes:
@@ -298,8 +265,6 @@ class _Anthropic(BatchProvider):
             (word, counts.get("succeeded"), ()),
             # Not `results_url`, which behind a gateway is the provider's own and unreachable.
             [f"{self._url}/{batch['id']}/results"] if has_ended else [],
-            total=sum(int(number or 0) for number in counts.values()),
-            created=batch.get("created_at"),
         )
 
 
@@ -307,12 +272,13 @@ class _Gemini(BatchProvider):
     """`/v1beta/models/{model}:batchGenerateContent` and `/v1beta/batches`."""
 
     headers: ClassVar[Mapping[str, str]] = {"x-goog-api-key": "{key}"}
+    named_in = "as its displayName"
 
     def __init__(self, config: ModelConfig) -> None:
         base = config.api_base or "https://generativelanguage.googleapis.com"
         base = base.rstrip("/").removesuffix("/v1beta")
         # The name of a batch includes the rest of the path.
-        super().__init__(config, base, f"{base}/v1beta", f"{base}/v1beta/batches?pageSize=100")
+        super().__init__(config, base, f"{base}/v1beta")
 
     def line(self, custom_id: str, body: bytes, headers: Mapping[str, str]) -> bytes:  # noqa: ARG002
         return _joined({"key": custom_id}, "request", body)
@@ -358,15 +324,7 @@ class _Gemini(BatchProvider):
             {**ends, "failed": "refused"}.get(word, "running"),
             (word or "begun", stats.get("successfulRequestCount"), [error] if error else ()),
             [f"{self._base}/download/v1beta/{file}:download?alt=media"] if file else [],
-            token=facts.get("displayName") or None,
-            total=stats.get("requestCount"),
-            created=facts.get("createTime"),
         )
-
-    def _read_page(self, page: Any) -> tuple[list[BatchStatus], str]:
-        token = page.get("nextPageToken")
-        batches = [self._read_status(batch) for batch in page.get("operations") or ()]
-        return batches, f"{self._first_page}&pageToken={token}" if token else ""
 
 
 PROVIDERS: Mapping[str, Callable[[ModelConfig], BatchProvider]] = {

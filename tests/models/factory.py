@@ -4,6 +4,7 @@ models in batches without a run around them: a list for the disk, and kills.
 
 import asyncio
 import itertools
+import re
 import threading
 from collections.abc import Callable, Collection, Coroutine, Sequence
 from dataclasses import dataclass, field
@@ -20,6 +21,7 @@ from phyblock.models.model import ModelEvent, RetryPolicy, build_model
 from phyblock.models.request import Image, Message, Model, Request
 from phyblock.records.record import BatchLine, Reply
 from phyblock.tracks.full_planning import PlanSubject
+from tests.servers.batches import BatchServer
 from tests.servers.chassis import LocalServer
 from tests.servers.openai_chat import OpenAIChat
 from tests.servers.other_protocols import AnthropicMessages, GeminiGenerate
@@ -217,6 +219,16 @@ async def command(
 
 def run_command(*args: Any, **options: Any) -> list[Reply | Exception]:
     return asyncio.run(command(*args, **options))
+
+
+def look_up(server: BatchServer, lines: list[BatchLine], error: str) -> list[BatchLine]:
+    """Return the lines as the error of a batch that may exist tells a person to change them."""
+    found = re.search(r"\{.*?\}", error)
+    assert found is not None, error
+    line = BatchLine.model_validate_json(found[0])
+    if (batch_id := server.id_of(line.batch)) is None:
+        return [one for one in lines if one.batch != line.batch]
+    return [*lines, line.model_copy(update={"id": batch_id})]
 
 
 class Killing:

@@ -14,7 +14,6 @@ from phyblock.config.models import ModelConfig
 from phyblock.errors import BudgetReachedError, SampleError, UnavailableError
 from phyblock.models.batch import (
     Batch,
-    UnsureError,
     answers_of,
     custom_id,
     read_batches,
@@ -32,6 +31,7 @@ from tests.models.factory import (
     Killing,
     ask,
     command,
+    look_up,
     make_model,
     make_request,
     run_command,
@@ -164,8 +164,6 @@ def test_a_refused_batch_stops_the_model_and_asks_nothing(disk):
 CALLS = {
     "a look fails": {"look": ("500", "reset", "503")},
     "an upload fails": {"upload": ("500", "reset"), "create": ("429",)},
-    "a batch is made unheard": {"create": ("done-reset",)},
-    "a batch is made with an error": {"create": ("500",), "list": ("500",)},
     "results fail": {"results": ("500", "done-reset", "reset")},
 }
 
@@ -183,8 +181,6 @@ TROUBLE = {
     "looks fail for long": {"look": ("500",) * 3},
     "results fail for long": {"results": ("500",) * 3},
     "results are not known": {"results": ("404",)},
-    "nobody knows whether it is sent": {"create": ("done-reset",), "list": ("500",) * 3},
-    "the list is not allowed": {"create": ("500",), "list": ("403",)},
 }
 
 
@@ -196,10 +192,34 @@ def test_what_cannot_be_learned_now_stops_the_model_and_is_learned_by_the_next_c
     requests, budget = requests_of(2), Budget(1e9)
     with serving(route, BatchFaults(calls=calls)) as (server, config):
         ended = run_command(config, disk, requests, policy=policy, budget=budget)
-        assert {type(one) for one in ended} <= {UnavailableError, UnsureError}
+        assert {type(one) for one in ended} == {UnavailableError}
         assert server.made == [] or budget.spent_usd > 0
         assert len(texts(run_command(config, disk, requests))) == 2
     assert once(server, 2)
+
+
+UNSURE = {
+    "it is made unheard": (("done-reset",), 1),
+    "it is made with an error": (("500",), 0),
+    "nobody knows": (("reset",), 0),
+}
+
+
+@pytest.mark.parametrize(("faults", "made"), UNSURE.values(), ids=list(UNSURE))
+def test_a_batch_that_may_exist_stops_the_model_until_it_is_looked_up(route, disk, faults, made):
+    requests = requests_of(2)
+    with serving(route, BatchFaults(calls={"create": faults})) as (server, config):
+        for _ in range(2):
+            budget = Budget(1e9)
+            ended = run_command(config, disk, requests, budget=budget)
+            assert {type(one) for one in ended} == {UnavailableError}
+            assert "it is not known whether batch pb" in str(ended[0])
+            assert len(server.made) == made
+            assert budget.spent_usd > 0
+        disk.lines = look_up(server, disk.lines, str(ended[0]))
+        assert len(texts(run_command(config, disk, requests))) == 2
+    assert once(server, 2)
+    assert len(server.made) == 1
 
 
 def test_a_wrong_key_stops_the_model_and_is_written_nowhere(route, disk):
@@ -275,6 +295,9 @@ def test_a_kill_at_any_moment_loses_nothing_and_asks_nothing_twice(route, tmp_pa
             is_over = asyncio.run(killing.run(command(config, disk, requests)))
             disk.moment, server.moment = None, lambda *_: None
             again = run_command(config, disk, requests, budget=Budget(1e9))
+            if "is not known whether" in str(again[0]):
+                disk.lines = look_up(server, disk.lines, str(again[0]))
+                again = run_command(config, disk, requests, budget=Budget(1e9))
             assert len(texts(again)) == 2
         assert once(server, 2), killing.names[at]
         if is_over:
@@ -365,7 +388,7 @@ def test_the_first_whole_line_of_a_request_answers_it(lines, requests):
 @given(st.sampled_from(["openai", "anthropic", "gemini"]), DOCUMENTS)
 def test_any_line_and_any_status_is_read_or_has_not_its_form(name, raw):
     provider = PROVIDERS[name](ModelConfig(name="m", id=f"{name}/m"))
-    for read in (provider.read, provider._read_status, provider._read_page):
+    for read in (provider.read, provider._read_status):
         with contextlib.suppress(*UNREADABLE):
             read(raw)
 

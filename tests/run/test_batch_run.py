@@ -101,10 +101,18 @@ def test_kills_of_the_process_lose_nothing_and_ask_nothing_twice(workspace):
     with Running(OpenAIBatches()) as running:
         server = running.server
         prepare(workspace, running.url)
-        for number, name in ((3, "create"), (5, "results")):
-            assert killed_at(workspace, server, number)
-            assert server.calls[-1] == name
-            assert not workspace.records()
+        assert killed_at(workspace, server, 3)
+        assert server.calls[-1] == "create"
+        for _ in range(2):
+            refused = workspace.run("--yes")
+            assert (refused.code, refused.err) == (1, "")
+            assert "it is not known whether batch pb" in refused.out
+        (line,) = set(re.findall(r"\{.*?\}", refused.out.replace("\n", " ")))
+        with (workspace.out / "batches.jsonl").open("a") as ledger:
+            ledger.write(line.replace('"ID"', '"batch-0"') + "\n")
+        assert killed_at(workspace, server, 5)
+        assert server.calls[-1] == "results"
+        assert not workspace.records()
         finished(workspace, server, 10)
 
 

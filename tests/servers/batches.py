@@ -33,7 +33,7 @@ class BatchFaults:
     LocalServer.reply ("length"), "expired", "cancelled", "missing", "broken", "twice" or "stranger"
     (an answer to nothing besides). `ends` gives by batch another state than an ordinary end:
     "expired", "cancelled" or "refused". `calls` gives by kind of call ("upload", "create", "look",
-    "list", "results") what the first ones meet: a status, "reset" (before anything), or
+    "results") what the first ones meet: a status, "reset" (before anything), or
     "done-reset" (it is done, and the answer lost). A batch ends at look number `looks`. `key` is
     the right one.
     """
@@ -62,8 +62,6 @@ class Made:
 
 class BatchServer(LocalServer):
     """One protocol's batches; `asked` counts each request that was worked on, by sample."""
-
-    page = 2
 
     def __init__(self, *args: Any, batch: BatchFaults | None = None, **options: Any) -> None:
         super().__init__(*args, **options)
@@ -121,19 +119,6 @@ class BatchServer(LocalServer):
         self.look(made)
         return self.told(made)
 
-    def listed(self, start: int) -> tuple[list[dict[str, Any]], bool]:
-        """A page of batches, the newest first, and whether there are more."""
-        end = start + self.page
-        newest = self.made[::-1][start:end]
-        for made in newest:
-            self.look(made)
-        return [self.told(made) for made in newest], end < len(self.made)
-
-    def after(self, batch_id: str | None) -> int:
-        """Return the start of the page that follows on a batch."""
-        newest = [made.id for made in reversed(self.made)]
-        return newest.index(batch_id) + 1 if batch_id else 0
-
     def make(self, token: str, requests: list[Any], call: web.Request) -> dict[str, Any]:
         """Begin a batch, which works on its requests whether it is looked at or not."""
         number = len(self.made)
@@ -148,6 +133,12 @@ class BatchServer(LocalServer):
             if is_asked and faults.get(place) not in NEVER_ASKED:
                 self.asked[seen.sample] += 1
         return self.told(made)
+
+    def id_of(self, token: str) -> str | None:
+        """The id of the batch with this name."""
+        made = next((made for made in self.made if made.token == token), None)
+        told = {} if made is None else self.told(made)
+        return told.get("id") or told.get("name")
 
     def find(self, request: web.Request) -> Made:
         wanted = request.match_info["id"].removeprefix("out-").partition(".")[0]
@@ -176,16 +167,13 @@ class BatchServer(LocalServer):
 
 
 class OpenAIBatches(BatchServer, OpenAIChat):
-    """/v1/files and /v1/batches; with `forgets_names` it keeps no metadata."""
-
-    forgets_names = False
+    """/v1/files and /v1/batches."""
 
     def add_routes(self, app: web.Application) -> None:
         super().add_routes(app)
         app.router.add_post("/v1/files", self.call("upload", self._upload))
         app.router.add_get("/v1/files/{id}/content", self.call("results", self._content))
         app.router.add_post("/v1/batches", self.call("create", self._create))
-        app.router.add_get("/v1/batches", self.call("list", self._list))
         app.router.add_get("/v1/batches/{id}", self.call("look", self.look_at))
 
     def key_of(self, request: web.Request) -> str:
@@ -217,10 +205,6 @@ class OpenAIBatches(BatchServer, OpenAIChat):
         requests = [(line["custom_id"], line["body"]) for line in lines]
         return self.make(body["metadata"]["phyblock"], requests, request)
 
-    async def _list(self, request: web.Request) -> dict[str, Any]:
-        rows, more = self.listed(self.after(request.query.get("after")))
-        return {"object": "list", "data": rows, "has_more": more}
-
     async def _content(self, request: web.Request) -> web.Response:
         is_bad = request.match_info["id"].endswith(".bad")
         lines = [line for line in self.find(request).lines if _failed(line) == is_bad]
@@ -235,7 +219,7 @@ class OpenAIBatches(BatchServer, OpenAIChat):
             "id": made.id,
             "object": "batch",
             "status": words.get(made.state, made.state),
-            "metadata": None if self.forgets_names else {"phyblock": made.token},
+            "metadata": {"phyblock": made.token},
             "request_counts": {
                 "total": len(made.requests), "completed": done - bad, "failed": bad,
             },
@@ -261,7 +245,6 @@ class AnthropicBatches(BatchServer, AnthropicMessages):
         super().add_routes(app)
         path = "/v1/messages/batches"
         app.router.add_post(path, self.call("create", self._create))
-        app.router.add_get(path, self.call("list", self._list))
         app.router.add_get(path + "/{id}", self.call("look", self.look_at))
         app.router.add_get(path + "/{id}/results", self.call("results", self._results))
 
@@ -285,10 +268,6 @@ class AnthropicBatches(BatchServer, AnthropicMessages):
         requests = [(one["custom_id"], one["params"]) for one in body["requests"]]
         assert all(len(name) <= 64 for name, _ in requests)
         return self.make(requests[0][0].rpartition("-")[0], requests, request)
-
-    async def _list(self, request: web.Request) -> dict[str, Any]:
-        rows, more = self.listed(self.after(request.query.get("after_id")))
-        return {"data": rows, "has_more": more, "last_id": ""}
 
     async def _results(self, request: web.Request) -> web.Response:
         # In no order of the requests.
@@ -323,7 +302,6 @@ class GeminiBatches(BatchServer, GeminiGenerate):
         app.router.add_post("/upload/v1beta/files", self.call("upload", self._announce))
         app.router.add_post("/upload/v1beta/sent", self._upload)
         app.router.add_post("/v1beta/models/{name}:batchGenerateContent", create)
-        app.router.add_get("/v1beta/batches", self.call("list", self._list))
         app.router.add_get("/v1beta/batches/{id}", self.call("look", self.look_at))
         results = self.call("results", self._results)
         app.router.add_get("/download/v1beta/files/{id}:download", results)
@@ -356,11 +334,6 @@ class GeminiBatches(BatchServer, GeminiGenerate):
         number = int(batch["input_config"]["file_name"].rpartition("-")[2])
         requests = [(line["key"], line["request"]) for line in self.files[number]]
         return self.make(batch["display_name"], requests, request)
-
-    async def _list(self, request: web.Request) -> dict[str, Any]:
-        start = int(request.query.get("pageToken", 0))
-        rows, more = self.listed(start)
-        return {"operations": rows, **({"nextPageToken": str(start + len(rows))} if more else {})}
 
     async def _results(self, request: web.Request) -> web.Response:
         assert request.query["alt"] == "media"
