@@ -25,7 +25,6 @@ _SECTIONS = {
         "run": (f"{_CLI}.run:run", "Run a suite, or continue where it stopped."),
         "play": (f"{_CLI}.run:play", "Answer a suite yourself, in a browser."),
         "score": (f"{_CLI}.run:score", "Score stored replies again; calls no model."),
-        "cache": (f"{_CLI}.setup:cache", "Show or clear the reply cache."),
     },
     "Look": {
         "report": (f"{_CLI}.results:report", "Rebuild tables and page, or print the tables."),

@@ -36,8 +36,7 @@ from phyblock.config.yaml import read_yaml
 from phyblock.data.lookup import read_data_set
 from phyblock.data.scenes import SCENES_FILE
 from phyblock.errors import InputError, ModelError, Problem, SpecError
-from phyblock.files import bundled, check_free, reply_cache_file, writing
-from phyblock.models.cache import ReplyCache
+from phyblock.files import bundled, check_free, writing
 from phyblock.registry import baseline_names
 from phyblock.run.plan import (
     bundled_suites,
@@ -267,34 +266,3 @@ async def _ask_tiny(config: ModelConfig) -> str:
     tokens = f"{usage.prompt_tokens or '?'} + {usage.completion_tokens or '?'} tokens"
     cost = "cost unknown" if reply.cost_usd is None else f"${reply.cost_usd:.6f}"
     return f"{reply.text.strip()[:80]!r} in {reply.latency_s:.1f} s, {tokens}, {cost}"
-
-
-@click.group()
-def cache() -> None:
-    """Show or clear the reply cache, which all runs of this user share."""
-
-
-@cache.command()
-def stats() -> None:
-    """Show the number of cached replies of each model, and the size of the file."""
-    console = make_console()
-    with ReplyCache(reply_cache_file()) as opened:
-        counts, size = opened.counts(), f"{opened.size_bytes / 1e6:,.1f} MB"
-    rows = [(model, f"{replies:,}") for model, replies in counts.items()]
-    if rows:
-        print_rows(console, ("model", "replies"), rows, numbers=1)
-    replies = counted(sum(counts.values()), "reply", "replies")
-    console.print(f"{replies}, {size}, in")
-    print_path(console, opened.path)
-
-
-@cache.command()
-@click.option("--model", metavar="ID", help="Delete only the replies of this model id.")
-@click.option("--yes", is_flag=True, help="Do not ask.")
-def clear(model: str | None, yes: bool) -> None:
-    """Delete cached replies; repeated calls will be billed."""
-    which = f"replies of {model}" if model else "all replies"
-    if not yes:
-        click.confirm(f"Delete {which}? Repeated calls will be billed.", abort=True)
-    with ReplyCache(reply_cache_file()) as opened:
-        make_console().print(f"Deleted {counted(opened.clear(model), 'reply', 'replies')}.")

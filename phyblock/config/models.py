@@ -8,7 +8,6 @@ import os
 import re
 import urllib.parse
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -117,13 +116,6 @@ def _one_or_list(value: object) -> object:
     return () if value is None else value if isinstance(value, list | tuple) else (value,)
 
 
-def _rising(tiers: tuple[Tier, ...]) -> Iterator[Fault]:
-    for n, (one, following) in enumerate(pairwise(tiers), start=1):
-        if following.above <= one.above:
-            message = "is not above that of the one before"
-            yield Fault(message, f"more than {one.above}", at=(n, "above"))
-
-
 class Price(Section):
     """Prices of tokens [USD per million]."""
 
@@ -139,26 +131,15 @@ class Price(Section):
     input."""
 
 
-class Rate(Price):
-    """Prices of tokens."""
+class Tariff(Price):
+    """The price of a model, if litellm's price map does not have it or is wrong."""
 
     batch: Price | None = None
     """Prices in batches; null: half at OpenAI's, Anthropic's and Google's own addresses, and the
     full price at any other."""
-
-
-class Tier(Rate):
-    """Prices of tokens in calls with long prompts."""
-
-    above: Count
-    """Prompts of more tokens than this."""
-
-
-class Tariff(Rate):
-    """The price of a model, if litellm's price map does not have it or is wrong."""
-
-    tiers: Annotated[tuple[Tier, ...], checked(_rising)] = ()
-    """Other prices for calls with long prompts, in ascending order of `above`."""
+    up_to: Count | None = None
+    """Longest prompt for which the price holds [tokens]; the cost of longer ones is unknown, and
+    under a cost limit they are not sent. null: any."""
 
 
 def _id_faults(model_id: str) -> Iterator[Fault]:
@@ -242,9 +223,7 @@ class ModelConfig(Section):
     max_concurrency: Count = 64
     """Maximum number of concurrent calls to this model. If missing: the suite's."""
     rpm: Count | None = None
-    """Maximum requests per minute."""
-    tpm: Count | None = None
-    """Maximum tokens per minute."""
+    """Maximum requests per minute, which start evenly."""
     temperature: Temperature | None = None
     """0 to 2. If missing: the suite's; null: not sent."""
     top_p: TopP | None = None
@@ -264,9 +243,6 @@ class ModelConfig(Section):
     max_tokens, max_completion_tokens."""
     price: Tariff | None = None
     """Price; null: that of litellm's price map, else unknown."""
-    max_cost_usd: Cost | None = None
-    """The model is stopped before it costs more than this in a run [USD]; null: only the limit of
-    the run applies."""
     seed: SendMode = "auto"
     """auto: seeds are sent if litellm knows that the provider accepts them, and to
     OpenAI-compatible servers named by api_base. always, never: sent, or not, in any case. Without

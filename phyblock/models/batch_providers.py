@@ -30,8 +30,7 @@ Post = tuple[str, bytes, Mapping[str, str]]
 UNREADABLE = (AttributeError, KeyError, TypeError, ValueError)
 """Errors of reading data that differ from the provider's documentation."""
 
-_LOOK_S = 60.0
-_TRANSFER_S = 3600.0
+_TRANSFER_S = 1800.0
 _LARGEST_RESULTS_BYTES = 1024**3
 
 
@@ -68,8 +67,7 @@ class BatchProvider(ABC):
         self._base = base
         self._url = url
         self._secrets = secrets_of(config)
-        self._looks = HttpClient(_LOOK_S)
-        self._transfers = HttpClient(_TRANSFER_S, _LARGEST_RESULTS_BYTES)
+        self._http = HttpClient(_TRANSFER_S, _LARGEST_RESULTS_BYTES)
 
     @abstractmethod
     def line(self, custom_id: str, body: bytes, headers: Mapping[str, str]) -> bytes:
@@ -97,10 +95,7 @@ class BatchProvider(ABC):
 
     async def results(self, status: BatchStatus) -> bytes:
         """Return the lines of a batch's results, without keys."""
-        bodies = [
-            await self._call(lambda answer: answer.body, url, is_large=True)
-            for url in status.results
-        ]
+        bodies = [await self._call(lambda answer: answer.body, url) for url in status.results]
         text = b"\n".join(bodies).decode("utf-8", "surrogateescape")
         return hidden(text, self._secrets, guess=False).encode("utf-8", "surrogateescape")
 
@@ -112,8 +107,7 @@ class BatchProvider(ABC):
 
     async def aclose(self) -> None:
         """Close all connections."""
-        await self._looks.aclose()
-        await self._transfers.aclose()
+        await self._http.aclose()
 
     @abstractmethod
     async def _prepare(self, token: str, lines: Sequence[bytes]) -> Post:
@@ -140,10 +134,8 @@ class BatchProvider(ABC):
         url: str,
         body: bytes | None = None,
         headers: Mapping[str, str] | None = None,
-        *,
-        is_large: bool = False,
     ) -> T:
-        """Send once and read the answer; `is_large` allows more time for the transfer."""
+        """Send once and read the answer."""
         try:
             if urlsplit(url)[:2] != urlsplit(self._base)[:2]:
                 why = f"nothing is sent to {host_of(url)}, which is not the model's server"
@@ -151,9 +143,8 @@ class BatchProvider(ABC):
             key = api_key(self._config) or ""
             own = {name: value.replace("{key}", key) for name, value in self.headers.items()}
             sent = {"Content-Type": "application/json", **own, **(headers or {})}
-            http = self._transfers if is_large or body is not None else self._looks
             method = "GET" if body is None else "POST"
-            answer = await http.send(url, body or b"", sent, method=method)
+            answer = await self._http.send(url, body or b"", sent, method=method)
             if answer.fault or not answer.is_success:
                 raise error_of(answer)
             try:

@@ -26,9 +26,9 @@ SCHEMA = 1
 
 _BUSY_TIMEOUT_S = 2.0
 _HINT = (
-    "delete the file, or name another cache folder; answered samples of a run stay in its records"
+    "free some space, delete the file, or name another cache folder with PHYBLOCK_CACHE; answered "
+    "samples of a run stay in its records"
 )
-_NO_ROOM = "free some space, or name another cache folder with PHYBLOCK_CACHE"
 _CREATE = """
 CREATE TABLE IF NOT EXISTS replies (
     key TEXT PRIMARY KEY, model TEXT NOT NULL, stored_at REAL NOT NULL, reply TEXT NOT NULL
@@ -73,7 +73,7 @@ class ReplyCache:
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise self._problem(f"cannot be made: {reason_of(error)}", hint=_NO_ROOM) from error
+            raise self._problem(f"cannot be made: {reason_of(error)}") from error
         try:
             self._db = sqlite3.connect(path, timeout=_BUSY_TIMEOUT_S, isolation_level=None)
             try:
@@ -82,7 +82,7 @@ class ReplyCache:
                 self._db.close()
                 raise
         except sqlite3.Error as error:
-            raise self._unusable(error) from error
+            raise self._problem(f"cannot be used: {error}") from error
 
     def __enter__(self) -> ReplyCache:
         return self
@@ -130,27 +130,6 @@ class ReplyCache:
         finally:
             self._asked.pop(key).set_result(None)
 
-    def counts(self) -> dict[str, int]:
-        """Return the number of replies by model id."""
-        with self._using():
-            sql = "SELECT model, count(*) FROM replies GROUP BY model ORDER BY model"
-            return dict(self._db.execute(sql).fetchall())
-        return {}
-
-    @property
-    def size_bytes(self) -> int:
-        """The size of its file, including the write-ahead log beside it."""
-        files = (self.path.with_name(self.path.name + end) for end in ("", "-wal"))
-        return sum(file.stat().st_size for file in files if file.exists())
-
-    def clear(self, model_id: str | None = None) -> int:
-        """Delete all replies, or those of one model id; return their number."""
-        with self._using():
-            sql = "DELETE FROM replies WHERE ?1 IS NULL OR model = ?1"
-            dropped = self._db.execute(sql, (model_id,)).rowcount
-            self._db.execute("VACUUM")
-        return dropped
-
     def close(self) -> None:
         """Release the file; the cache is not used afterwards."""
         self._db.close()
@@ -180,17 +159,10 @@ class ReplyCache:
             yield
         except sqlite3.Error as error:
             if self._report is None:
-                raise self._unusable(error) from error
+                raise self._problem(f"cannot be used: {error}") from error
             self._is_off = True
             self._report(f"reply cache {self.path}: cannot be used: {error}; going on without it")
 
-    def _unusable(self, error: sqlite3.Error) -> StoreError:
-        # An operational error is of the disk, the place or another process, not of the content.
-        hint = _NO_ROOM if isinstance(error, sqlite3.OperationalError) else _HINT
-        return self._problem(f"cannot be used: {error}", hint=hint)
-
-    def _problem(
-        self, message: str, found: str = "", allowed: str = "", hint: str = _HINT
-    ) -> StoreError:
+    def _problem(self, message: str, found: str = "", allowed: str = "") -> StoreError:
         where = f"reply cache {self.path}"
-        return StoreError(Problem(where, message, found=found, allowed=allowed, hint=hint))
+        return StoreError(Problem(where, message, found=found, allowed=allowed, hint=_HINT))

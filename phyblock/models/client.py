@@ -7,7 +7,7 @@ is sent twice. aiohttp is imported by the first call.
 
 from __future__ import annotations
 
-import email.utils
+import json
 import math
 import re
 import time
@@ -16,7 +16,6 @@ import urllib.request
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Any
 
 from phyblock.config.models import ModelConfig, host_of
@@ -32,7 +31,7 @@ from phyblock.errors import (
 )
 from phyblock.files import load_json
 from phyblock.models.keys import api_key, hidden, secrets_of
-from phyblock.models.request import Request, json_body, wire_params
+from phyblock.models.request import Request, wire_messages, wire_params
 from phyblock.records.record import Reply, Usage
 from phyblock.text import well_formed
 from phyblock.types import Finish
@@ -95,10 +94,7 @@ class Client(ABC):
         try:
             reply = await self._complete(request, seed)
         except ModelError as error:
-            said = shown(str(error), self._secrets)
-            if seed is not None and error.status in (400, 422) and re.search(r"\bseed\b", said):
-                said += " (set seed: never for a provider that takes none)"
-            error.args = (said,)
+            error.args = (shown(str(error), self._secrets),)
             raise
         texts = {
             name: hidden(text, self._secrets, guess=False)
@@ -145,6 +141,15 @@ class Answer:
         return 200 <= self.status < 300
 
 
+def _proxy_for(url: str) -> str | None:
+    """Return the proxy that the environment sets for an address."""
+    parts, proxies = urllib.parse.urlsplit(url), urllib.request.getproxies()
+    proxy = proxies.get(parts.scheme) or proxies.get("all")
+    if not proxy or urllib.request.proxy_bypass(parts.hostname or ""):
+        return None
+    return proxy if "://" in proxy else f"http://{proxy}"
+
+
 class HttpClient:
     """Sends requests for one model over one session, which the first request opens."""
 
@@ -152,7 +157,6 @@ class HttpClient:
         self._timeout_s = timeout_s
         self._most_bytes = most_bytes or LARGEST_REPLY_BYTES
         self._session: aiohttp.ClientSession | None = None
-        self._proxies: dict[tuple[str, str], str | None] = {}
 
     async def send(
         self, url: str, body: bytes, headers: Mapping[str, str], *, method: str = "POST"
@@ -179,41 +183,29 @@ class HttpClient:
                 yarl.URL(url, encoded=url.isascii()),
                 data=body,
                 headers={**headers, "Accept-Encoding": "gzip, deflate"},
-                proxy=self._proxy(url),
+                proxy=_proxy_for(url),
                 allow_redirects=False,
             ) as response:
-                content, fault = await self._read(response, url)
+                content, fault = await self._read(response)
                 if fault:
                     response.close()
                 return Answer(response.status, response.headers, content, fault)
-        except aiohttp.ConnectionTimeoutError:
-            raise UnreachableError(f"no connection to {host} in time") from None
+        except (aiohttp.ConnectionTimeoutError, aiohttp.ClientConnectorError) as error:
+            raise UnreachableError(f"no connection to {host}: {error or 'not in time'}") from None
         except TimeoutError:
             within = f"no whole answer within {self._timeout_s:g} s"
             raise RetryableError(within, sent="maybe") from None
-        except aiohttp.ClientConnectorError as error:
-            where = "the proxy" if isinstance(error, aiohttp.ClientProxyConnectionError) else host
-            dns = " (DNS)" if isinstance(error, aiohttp.ClientConnectorDNSError) else ""
-            reason = getattr(error, "certificate_error", None) or error.os_error.strerror
-            why = f"no connection to {where}{dns}: {reason or error.os_error}"
-            raise UnreachableError(why) from None
         except (aiohttp.ClientError, OSError) as error:
             said = f"{type(error).__name__}: {error}".strip(": ")
             lost = f"the connection to {host} was lost ({said})"
             raise RetryableError(lost, sent="lost") from None
 
-    async def _read(self, response: aiohttp.ClientResponse, url: str) -> tuple[bytes, str]:
+    async def _read(self, response: aiohttp.ClientResponse) -> tuple[bytes, str]:
         """Return the body, or b"" and its problem."""
         import aiohttp
 
         if 300 <= response.status < 400:
-            location = response.headers.get("Location")
-            try:
-                # Without its path and query, which may hold a secret.
-                target = host_of(urllib.parse.urljoin(url, location)) if location else "nowhere"
-            except ValueError:
-                target = "nowhere"
-            return b"", f"redirects to {target}, and no redirect is followed"
+            return b"", "it redirects, and no redirect is followed"
         pieces: list[bytes] = []
         size = 0
         try:
@@ -231,18 +223,6 @@ class HttpClient:
         if self._session is not None:
             await self._session.close()
             self._session = None
-
-    def _proxy(self, url: str) -> str | None:
-        """Return the proxy that the environment sets for an address, looked up once."""
-        parts = urllib.parse.urlsplit(url)
-        place = parts.scheme, parts.hostname or ""
-        if place not in self._proxies:
-            proxies = urllib.request.getproxies()
-            proxy = proxies.get(place[0]) or proxies.get("all")
-            if urllib.request.proxy_bypass(place[1]):
-                proxy = None
-            self._proxies[place] = f"http://{proxy}" if proxy and "://" not in proxy else proxy
-        return self._proxies[place]
 
 
 class OpenAIClient(Client):
@@ -266,7 +246,8 @@ class OpenAIClient(Client):
         if seed is not None:
             fields["seed"] = seed
         fields |= extra_body
-        body = json_body(fields, request.messages, self.config.image_detail)
+        fields["messages"] = wire_messages(request.messages, self.config.image_detail)
+        body = json.dumps(fields, allow_nan=False).encode()
         started_s = time.perf_counter()
         answer = await self.http.send(self._url, body, headers)
         return read_completion(read_json(answer), time.perf_counter() - started_s, answer.status)
@@ -351,19 +332,12 @@ def _words(body: bytes) -> tuple[str, tuple[str, ...]]:
 
 
 def retry_after_s(headers: Mapping[str, str]) -> float | None:
-    """Return the seconds of a `Retry-After` header, given as seconds or HTTP date."""
-    value = next((v for k, v in headers.items() if k.lower() == "retry-after"), None)
-    if value is None:
-        return None
+    """Return the seconds of a `Retry-After` header; None if there is none, or it is a date."""
+    value = next((v for k, v in headers.items() if k.lower() == "retry-after"), "")
     try:
         asked_s = float(value)
     except ValueError:
-        try:
-            then = email.utils.parsedate_to_datetime(value)
-        except (ValueError, OverflowError):
-            return None
-        then = then if then.tzinfo else then.replace(tzinfo=UTC)
-        asked_s = (then - datetime.now(UTC)).total_seconds()
+        return None
     return max(0.0, asked_s) if math.isfinite(asked_s) else None
 
 

@@ -15,17 +15,15 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
-from phyblock.config.models import ModelConfig, Price, Rate, Tariff, host_of
+from phyblock.config.models import ModelConfig, Price, Tariff, host_of
 from phyblock.errors import BudgetReachedError, ModelError, UnavailableError
 from phyblock.files import read_own_yaml
 from phyblock.models.keys import KEYLESS, api_key_status
 from phyblock.models.request import Image, Request, wire_params
 from phyblock.records.record import Reply, Usage
 from phyblock.types import ImageDetail
-
-_RateT = TypeVar("_RateT", bound=Rate)
 
 FREE = Tariff(input=0.0, output=0.0)
 _MAP_FILE = "model_prices_and_context_window_backup.json"
@@ -62,39 +60,35 @@ def tariff_of(config: ModelConfig) -> Tariff | None:
     tariff = config.price or _mapped_tariff(config)
     host, base = _HALVING_HOSTS.get(config.provider), config.api_base
     is_halved = host is not None and (host_of(base) == host if base else not config.addresses)
-    if tariff is None or not is_halved:
+    if tariff is None or tariff.batch is not None or not is_halved:
         return tariff
-    return _halved(tariff).model_copy(update={"tiers": tuple(map(_halved, tariff.tiers))})
+    half = {name: None if usd is None else usd / 2 for name, usd in tariff if name in _MAP_KEYS}
+    return tariff.model_copy(update={"batch": Price.model_validate(half)})
 
 
-def _halved(rate: _RateT) -> _RateT:
-    """Return the rate with half its price for batches, unless it has a price for them."""
-    half = {name: None if usd is None else usd / 2 for name, usd in rate if name in _MAP_KEYS}
-    return rate if rate.batch else rate.model_copy(update={"batch": Price.model_validate(half)})
-
-
-def price_at(tariff: Tariff, prompt_tokens: int = 0, *, batched: bool = False) -> Price:
-    """Return the price of a call with such a prompt."""
-    longer = (tier for tier in reversed(tariff.tiers) if prompt_tokens > tier.above)
-    rate: Rate = next(longer, tariff)
-    return rate.batch if batched and rate.batch is not None else rate
+def price_at(tariff: Tariff, *, batched: bool = False) -> Price:
+    """Return the price of a call, in a batch or by itself."""
+    return tariff.batch if batched and tariff.batch is not None else tariff
 
 
 def is_free(tariff: Tariff) -> bool:
-    """True if every call is free, for any prompt and in batches too."""
-    rates = (tariff, *tariff.tiers)
-    prices = [price for rate in rates for price in (rate, rate.batch) if price is not None]
+    """True if every call is free, in batches too."""
+    prices = [price for price in (tariff, tariff.batch) if price is not None]
     return not any(getattr(price, name) for price in prices for name in _MAP_KEYS)
 
 
 def cost_usd(tariff: Tariff | None, reply: Reply) -> float | None:
-    """Return US dollars of a reply; None if price or numbers of tokens are unknown."""
+    """Return US dollars of a reply; None if price or numbers of tokens are unknown, or if the
+    prompt is longer than the price holds for.
+    """
     if tariff is None or is_free(tariff):
         return None if tariff is None else 0.0
     usage = reply.usage
     if usage.prompt_tokens is None or usage.completion_tokens is None:
         return None
-    price = price_at(tariff, usage.prompt_tokens, batched=reply.batched)
+    if tariff.up_to is not None and usage.prompt_tokens > tariff.up_to:
+        return None
+    price = price_at(tariff, batched=reply.batched)
     read, written = usage.cached_tokens or 0, usage.cache_write_tokens or 0
     read_usd = price.input if price.cached is None else price.cached
     write_usd = price.input if price.cache_write is None else price.cache_write
@@ -142,23 +136,17 @@ def mapped_providers() -> frozenset[str]:
 
 
 def _mapped_tariff(config: ModelConfig) -> Tariff | None:
-    """Return the price in the map, or None."""
+    """Return the price in the map of the shortest prompts, or None."""
     entry = map_entry(config)
-    if isinstance(entry.get("tiered_pricing"), list):
-        tiers = entry["tiered_pricing"]
-        places = [(int(tier["range"][0]), tier, "") for tier in tiers if "range" in tier]
-    else:
-        found = (match[1] for match in map(_ABOVE.fullmatch, entry) if match)
-        above = [(int(number) * 1000, entry, f"_above_{number}k_tokens") for number in found]
-        places = [(0, entry, ""), *above]
-    rates = [
-        {"above": above, "batch": _mapped_price(fields, f"{ending}_batches"), **price}
-        for above, fields, ending in sorted(places, key=lambda place: place[0])
-        if (price := _mapped_price(fields, ending)) is not None
-    ]
-    if not rates or rates[0].pop("above") != 0:
+    ends = [1000 * int(match[1]) for match in map(_ABOVE.fullmatch, entry) if match]
+    tiers = entry.get("tiered_pricing")
+    if isinstance(tiers, list):
+        entry = min(tiers, key=lambda tier: tier["range"][0])
+        ends = [int(entry["range"][1])]
+    if (price := _mapped_price(entry, "")) is None:
         return None
-    return Tariff.model_validate({**rates[0], "tiers": rates[1:]})
+    batch, up_to = _mapped_price(entry, "_batches"), min(ends, default=None)
+    return Tariff.model_validate({**price, "batch": batch, "up_to": up_to})
 
 
 def _mapped_price(entry: Mapping[str, Any], ending: str) -> dict[str, Any] | None:
@@ -176,25 +164,16 @@ class Budget:
     """A cost limit for a whole run: room is reserved before a call and settled after it.
 
     Spending never decreases, and an unknown cost counts as the whole reserve. Without
-    `max_cost_usd` it only counts. `of_models` is the earlier cost of each model.
+    `max_cost_usd` it only counts. `spent_usd` is the cost of settled calls, which includes that of
+    earlier commands.
     """
 
-    def __init__(
-        self, max_cost_usd: float | None = None, of_models: Mapping[str, float] | None = None
-    ) -> None:
+    def __init__(self, max_cost_usd: float | None = None, spent_usd: float = 0.0) -> None:
         self.max_usd = math.inf if max_cost_usd is None else max_cost_usd
-        self._of_models = dict(of_models or {})
-        self.spent_usd = sum(self._of_models.values())
-        """The cost of settled calls, including the cost at the start."""
+        self.spent_usd = spent_usd
         self.held_usd = 0.0
         self.holds = 0
         self.changed = asyncio.Event()
-
-    def of(
-        self, model: str, tariff: Tariff | None = None, max_cost_usd: float | None = None
-    ) -> ModelBudget:
-        """Return the budget of a model within it, which may have its own limit."""
-        return ModelBudget(self, tariff, max_cost_usd, self._of_models.get(model, 0.0))
 
 
 class ModelBudget:
@@ -205,29 +184,27 @@ class ModelBudget:
     most one more at once than have been settled: 1, 2, 4, ...
     """
 
-    def __init__(
-        self, run: Budget, tariff: Tariff | None, max_cost_usd: float | None, spent_usd: float
-    ) -> None:
+    def __init__(self, run: Budget, tariff: Tariff | None = None) -> None:
         self._run = run
         self.tariff = tariff
-        self._max_usd = math.inf if max_cost_usd is None else max_cost_usd
-        self._spent_usd = spent_usd
         self._held: dict[int, float] = {}
-        self._held_usd = 0.0
         self._next = 0
         self._under_way: set[int] = set()
         self._settled = 0
         self._prompt_ratio = self._reply_ratio = 1.0
-        self.is_limited = min(self._max_usd, run.max_usd) < math.inf
+        self.is_limited = run.max_usd < math.inf
 
     def most_usd(self, expected: Estimate, *, batched: bool = False) -> float | None:
         """Return the most that a call can cost, by what is known of the model so far; None without
-        a price.
+        a price. Raises UnavailableError if a limit cannot be kept for such a long prompt.
         """
         if self.tariff is None:
             return None
         longest = math.ceil(expected.most_completion_tokens * self._reply_ratio)
         prompt = expected.prompt_tokens * self._prompt_ratio
+        if self.is_limited and self.tariff.up_to is not None and prompt > self.tariff.up_to:
+            why = f"prompts of more than {self.tariff.up_to:,} tokens have another price"
+            raise UnavailableError(f"{why}: set it in models.yaml, or run without max_cost_usd")
         return most_usd(self.tariff, prompt, longest, batched=batched)
 
     async def reserve(self, most_usd: Callable[[], float], *, together: bool = False) -> int:
@@ -236,18 +213,13 @@ class ModelBudget:
 
         `most_usd` is computed again whenever a call has settled, since more is known of the model
         then. Calls that are sent `together` do not wait for the first ones. Raises
-        BudgetReachedError if it exceeds the run's limit with no call in progress, UnavailableError
-        if it exceeds the model's own.
+        BudgetReachedError if it exceeds the limit with no call in progress.
         """
         run = self._run
         while True:
             usd = most_usd()
-            if not self._held and self._spent_usd + usd > self._max_usd:
-                spent = f"its max_cost_usd: ${self._spent_usd:.4f} of ${self._max_usd:g} spent"
-                raise UnavailableError(f"{spent}; the next call can cost ${usd:.4f}")
             is_slow = self.is_limited and len(self._under_way) > self._settled
-            fits = self._spent_usd + self._held_usd + usd <= self._max_usd
-            fits = fits and run.spent_usd + run.held_usd + usd <= run.max_usd
+            fits = run.spent_usd + run.held_usd + usd <= run.max_usd
             if fits and (together or not is_slow):
                 number = self.hold(usd)
                 if not together:
@@ -263,7 +235,6 @@ class ModelBudget:
         """Make a reservation even if it exceeds the limit; return its number."""
         self._next += 1
         self._held[self._next] = usd
-        self._held_usd += usd
         self._run.held_usd += usd
         self._run.holds += 1
         return self._next
@@ -276,11 +247,9 @@ class ModelBudget:
         self._under_way.discard(reservation)
         self._settled += 1
         counted = usd if usd is not None and math.isfinite(usd) and usd >= 0 else held
-        self._spent_usd += counted
         run = self._run
         run.holds -= 1
         # Rounding errors of the running sum must not add up over a run.
-        self._held_usd = max(0.0, self._held_usd - held) if self._held else 0.0
         run.held_usd = max(0.0, run.held_usd - held) if run.holds else 0.0
         run.spent_usd += counted
         run.changed.set()
@@ -335,13 +304,9 @@ def most_usd(
     """Return the most US dollars that a call can cost, if all of its prompt is written to a cache.
     The prompt has a margin, since its tokens are estimated.
     """
-    prompt = prompt_tokens * _PROMPT_MARGIN
-    # Longer prompts may be cheaper.
-    prices = [price_at(tariff, math.ceil(n), batched=batched) for n in (prompt_tokens, prompt)]
-    return max(
-        (prompt * max(p.input, p.cache_write or 0.0) + reply_tokens * p.output) / 1_000_000
-        for p in prices
-    )
+    price, prompt = price_at(tariff, batched=batched), prompt_tokens * _PROMPT_MARGIN
+    prompt_usd = prompt * max(price.input, price.cache_write or 0.0)
+    return (prompt_usd + reply_tokens * price.output) / 1_000_000
 
 
 def may_be_billed(error: ModelError) -> bool:

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import importlib.util
 import logging
 import os
 import time
@@ -32,7 +31,7 @@ from phyblock.models.client import (
     read_json,
     read_raw_reply,
 )
-from phyblock.models.costs import map_entry, mapped_providers
+from phyblock.models.costs import mapped_providers
 from phyblock.models.keys import KEYLESS, api_key
 from phyblock.models.request import Request, wire_messages, wire_params
 from phyblock.records.record import Reply, Usage
@@ -250,13 +249,8 @@ def be_quiet() -> None:
 
 
 def known_providers(config: ModelConfig) -> frozenset[str]:
-    """Return known providers, including that of the model if it is known.
-
-    litellm is imported only if its map has neither the model nor another of its provider.
-    """
-    at_hand = frozenset((*DIRECT_PROVIDERS, *KEYLESS))
-    if config.provider in at_hand or map_entry(config) or config.provider in mapped_providers():
-        return frozenset((config.provider,))
-    if importlib.util.find_spec("litellm") is None:
-        return at_hand
-    return at_hand | {str(getattr(one, "value", one)) for one in _litellm().provider_list}
+    """Return known providers; litellm is imported only if the model has none of the usual ones."""
+    usual = frozenset((*DIRECT_PROVIDERS, *KEYLESS, *mapped_providers()))
+    if config.provider in usual:
+        return usual
+    return usual | {str(getattr(one, "value", one)) for one in _litellm().provider_list}

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import time
-from collections import deque
 from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
@@ -43,7 +42,6 @@ if TYPE_CHECKING:
 _SCHEMA_PROVIDERS = ("predibase", "fireworks_ai", "lm_studio", "nebius", "databricks")
 """Providers whose models all accept a schema according to litellm."""
 
-WINDOW_S = 60.0
 _NAP_S = 1.0
 
 
@@ -55,20 +53,11 @@ class Clock:
     sleep: Callable[[float], Awaitable[None]] = asyncio.sleep
 
 
-@dataclass
-class Started:
-    """A started request: its time [s], and its tokens for the limit."""
-
-    at_s: float
-    tokens: int
-
-
 class Limits:
-    """All limits of one model: requests in progress, and requests and tokens in any 60 s.
+    """The limits of one model: requests in progress, and requests a minute, which start evenly.
 
-    A single request larger than `tpm` is admitted when nothing was started for a minute, or it
-    could never start. `overall` is shared by all models of a run; `cooling_s` returns how long
-    no server of the model may be asked, as after a 429.
+    `overall` is shared by all models of a run; `cooling_s` returns how long no server of the model
+    may be asked, as after a 429.
     """
 
     def __init__(
@@ -76,62 +65,36 @@ class Limits:
         most: int,
         overall: asyncio.Semaphore,
         rpm: int | None = None,
-        tpm: int | None = None,
         *,
         cooling_s: Callable[[], float] = lambda: 0.0,
         clock: Clock | None = None,
     ) -> None:
         self._under_way = asyncio.Semaphore(most)
         self._overall = overall
-        self._rpm = rpm
-        self._tpm = tpm
+        self._apart_s = 60.0 / rpm if rpm else 0.0
+        self._next_s = float("-inf")
         self._cooling_s = cooling_s
         self._clock = clock or Clock()
         self._admission = asyncio.Lock()
-        self._started: deque[Started] = deque()
-        self._tokens = 0
 
     @contextlib.asynccontextmanager
-    async def slot(self, tokens: int) -> AsyncIterator[Started]:
-        """Hold a place of the model and of the whole run; `tokens` is the estimate for tpm.
+    async def slot(self) -> AsyncIterator[None]:
+        """Hold a place of the model and of the whole run.
 
-        Requests are admitted one after another; a model that waits for its minute holds no place
-        that another model could use.
+        Requests are admitted one after another; a model that waits for its turn holds no place that
+        another model could use.
         """
         async with self._under_way:
             async with self._admission:
-                while (wait_s := max(self._cooling_s(), self._window_s(tokens))) > 0:
+                while (wait_s := max(self._cooling_s(), self._next_s - self._clock.now())) > 0:
                     # In short waits, since the last server may be given up meanwhile.
                     await self._clock.sleep(min(wait_s, _NAP_S))
                 await self._overall.acquire()
-                started = Started(self._clock.now(), tokens)
-                self._started.append(started)
-                self._tokens += tokens
+                self._next_s = self._clock.now() + self._apart_s
             try:
-                yield started
+                yield
             finally:
                 self._overall.release()
-
-    def settle(self, started: Started, tokens: int) -> None:
-        """Replace the estimate by the tokens that a request really took."""
-        if started.at_s > self._clock.now() - WINDOW_S:
-            self._tokens += tokens - started.tokens
-            started.tokens = tokens
-
-    def _window_s(self, tokens: int) -> float:
-        """Return the seconds until a request of this many tokens may start."""
-        now = self._clock.now()
-        while self._started and self._started[0].at_s <= now - WINDOW_S:
-            self._tokens -= self._started.popleft().tokens
-        must_leave = 0 if self._rpm is None else max(0, len(self._started) - self._rpm + 1)
-        if self._tpm is not None:
-            held = self._tokens
-            for count, started in enumerate(self._started):
-                if held + tokens <= self._tpm:
-                    break
-                held -= started.tokens
-                must_leave = max(must_leave, count + 1)
-        return self._started[must_leave - 1].at_s + WINDOW_S - now if must_leave else 0.0
 
 
 @dataclass(frozen=True)
@@ -376,24 +339,20 @@ class ChatModel:
 
     async def _attempt(self, call: _Call) -> Reply:
         """Send once, when limits and budget have room."""
-        expected, held = call.expected, None
-        async with self.limits.slot(expected.prompt_tokens + expected.completion_tokens) as slot:
+        held = None
+        async with self.limits.slot():
             if self.budget.tariff is not None:
-                held = await self.budget.reserve(lambda: self.budget.most_usd(expected) or 0.0)
+                held = await self.budget.reserve(lambda: self.budget.most_usd(call.expected) or 0.0)
             exchange = asyncio.ensure_future(self._exchange(call, held))
             try:
-                reply = await asyncio.shield(exchange)
+                return await asyncio.shield(exchange)
             except asyncio.CancelledError:
                 call.is_cancelled = True
                 try:
-                    reply = await exchange
+                    return await exchange
                 except RetryableError:
                     # It would otherwise be sent again.
                     raise asyncio.CancelledError from None
-            prompt, completion = reply.usage.prompt_tokens, reply.usage.completion_tokens
-            if prompt is not None and completion is not None:
-                self.limits.settle(slot, prompt + completion)
-            return reply
 
     async def _exchange(self, call: _Call, held: int | None) -> Reply:
         """Write that a call is sent, send it, and write its end.
@@ -494,7 +453,7 @@ def build_model(
         raise SpecError(Problem(where, "needs a provider", "id", config.id, hint=hint))
     policy = policy or RetryPolicy()
     tariff = tariff_of(config)
-    own = (budget or Budget()).of(config.name, tariff, config.max_cost_usd)
+    own = ModelBudget(budget or Budget(), tariff)
     if own.is_limited and tariff is None:
         hint = "give it a price in models.yaml, or run without max_cost_usd"
         message = "has no known price, so that max_cost_usd cannot be kept"
@@ -527,7 +486,6 @@ def build_model(
         config.max_concurrency,
         overall or asyncio.Semaphore(config.max_concurrency),
         config.rpm,
-        config.tpm,
         cooling_s=servers.cooling_s,
         clock=policy.clock,
     )

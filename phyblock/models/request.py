@@ -1,20 +1,12 @@
-"""Requests, the protocol of models, and the JSON of the OpenAI chat protocol.
-
-`wire_messages` returns messages for litellm, `json_body` a whole request body as bytes; both have
-the same content. Pictures make up nearly all of a body, so they bypass the JSON encoder: base64 has
-nothing to escape.
-"""
+"""Requests, the protocol of models, and the JSON of the OpenAI chat protocol."""
 
 from __future__ import annotations
 
 import base64
 import functools
 import itertools
-import json
-import secrets
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from operator import attrgetter
 from typing import Any, Protocol
 
 from phyblock.config.models import ModelConfig
@@ -23,8 +15,6 @@ from phyblock.records.record import Call, Reply
 from phyblock.text import hex_digest
 from phyblock.types import ImageDetail, Role
 
-_MARK = secrets.token_hex(16)
-"""Random placeholder of a picture in a body, which no text can contain."""
 _MAGIC = (
     (b"\x89PNG\r\n\x1a\n", "image/png"),
     (b"\xff\xd8\xff", "image/jpeg"),
@@ -154,25 +144,8 @@ def wire_params(config: ModelConfig, request: Request) -> dict[str, Any]:
     return {name: value for name, value in merged.items() if value is not None}
 
 
-def json_body(
-    fields: Mapping[str, Any], messages: tuple[Message, ...], detail: ImageDetail | None
-) -> bytes:
-    """Return a request body of `fields` and `messages`."""
-    pictures: list[bytes] = []
-
-    def placeholder(image: Image) -> str:
-        pictures.append(image.data_uri.encode())
-        return _MARK
-
-    body = {**fields, "messages": wire_messages(messages, detail, placeholder)}
-    first, *others = json.dumps(body, allow_nan=False).encode().split(_MARK.encode())
-    return b"".join((first, *itertools.chain(*zip(pictures, others, strict=True))))
-
-
 def wire_messages(
-    messages: tuple[Message, ...],
-    detail: ImageDetail | None,
-    url_of: Callable[[Image], str] = attrgetter("data_uri"),
+    messages: tuple[Message, ...], detail: ImageDetail | None
 ) -> list[dict[str, Any]]:
     """Return chat messages, texts and pictures in the order given; a single text is a plain string.
 
@@ -183,7 +156,7 @@ def wire_messages(
         if isinstance(part, str):
             return {"type": "text", "text": part}
         looked_at = {} if detail is None else {"detail": detail}
-        return {"type": "image_url", "image_url": {"url": url_of(part), **looked_at}}
+        return {"type": "image_url", "image_url": {"url": part.data_uri, **looked_at}}
 
     def content(message: Message) -> str | list[dict[str, Any]]:
         if len(message.parts) == 1 and isinstance(message.parts[0], str):

@@ -56,7 +56,7 @@ class Estimate:
         usual, most, reply_usd = expected.completion_tokens, expected.most_completion_tokens, 0.0
         if self.tariff is not None:
             prompt, batched = expected.prompt_tokens, self.model.batch
-            price = price_at(self.tariff, prompt, batched=batched)
+            price = price_at(self.tariff, batched=batched)
             reply_usd = price.output / 1_000_000
             self.prompt_usd += prompt * price.input / 1_000_000
             self._most_usd += most_usd(self.tariff, prompt, most, batched=batched)

@@ -246,7 +246,7 @@ class Session:
             build_model,
             cache=cache,
             overall=asyncio.Semaphore(limits.max_concurrency),
-            budget=Budget(limits.max_cost_usd, store.progress.limit_usd),
+            budget=Budget(limits.max_cost_usd, sum(store.progress.limit_usd.values())),
             journal=store,
             report=self.watch,
             policy=RetryPolicy(limits.max_attempts, limits.retry_for_s),

@@ -485,8 +485,6 @@ CACHES = (
     Bad("foreign-cache", after(foreign_cache, *CACHED),
         ("replies.sqlite", "another version", "hint: "),
         writes=("fresh",)),
-    Bad("broken-stats", file("cache/replies.sqlite", b"not a database" * 40, "cache", "stats"),
-        ("replies.sqlite",)),
     Bad("full-cache", command(*FRESH, "--models", "alpha", "--set", "seeds=[1]"),
         ("replies.sqlite", "cannot be used: disk I/O error", "free some space"),
         writes=("fresh", "cache/replies.sqlite-"), bytes_left=6000),

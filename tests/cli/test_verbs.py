@@ -65,7 +65,7 @@ def test_help_and_version_import_nothing_heavy():
         assert f"\n  {verb} " in told
     assert "phyblock run quick" in told
     assert not imported & {*HEAVY, "numpy", "pydantic", "rich", "yaml"}
-    verbs = ("run", "report", "score", "validate", "models", "cache", "init")
+    verbs = ("run", "report", "score", "validate", "models", "init")
     told, imported = ran(COMMANDS, "--version", *(f"{verb} --help" for verb in verbs))
     assert told.startswith("phyblock, version ")
     for verb in verbs:

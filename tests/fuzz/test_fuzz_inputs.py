@@ -95,7 +95,7 @@ _PLACES = st.sampled_from(
 _VERBS = (
     *("run", "score", "report", "figures", "compare", "export", "show", "play"),
     *("bundle", "verify", "site"),
-    *("models", "validate", "scenes", "questions", "cache", "init", "--help", "-V", "nope", ""),
+    *("models", "validate", "scenes", "questions", "init", "--help", "-V", "nope", ""),
 )
 _WORDS = (
     *("suite.yaml", "data", "questions", "thesis", "gone", "stats", "audit", "show", "verify"),

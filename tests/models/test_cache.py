@@ -76,7 +76,7 @@ def test_keys_are_equal_when_all_that_decides_is_equal(config, request, other_co
     "fields",
     [
         {"name": "other"},
-        {"transport": "litellm", "max_concurrency": 1, "rpm": 5, "tpm": 7},
+        {"transport": "litellm", "max_concurrency": 1, "rpm": 5},
         {"price": {"input": 1, "output": 2}, "timeout_s": 1.0, "api_key_env": "KEY"},
         {"api_base": "http://node17:2/v1"},
         {"temperature": 0.5},
@@ -198,7 +198,6 @@ def test_processes_share_one_file(tmp_path):
         process.communicate()
         assert process.returncode == 0
     with ReplyCache(path) as cache:
-        assert cache.counts() == {"openai/m": 200}
         assert all(cache.get(f"{name}-{n}") for name in "ab" for n in range(100))
 
 

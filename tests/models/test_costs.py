@@ -1,18 +1,20 @@
 """Prices, estimates and the budget."""
 
 import asyncio
+import contextlib
 import functools
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.config.models import ModelConfig, Price, Tariff, Tier
-from phyblock.errors import BudgetReachedError, RetryableError, SpecError
+from phyblock.config.models import ModelConfig, Price, Tariff
+from phyblock.errors import BudgetReachedError, RetryableError, SpecError, UnavailableError
 from phyblock.models.cache import ReplyCache
 from phyblock.models.costs import (
     Budget,
     Estimate,
+    ModelBudget,
     cost_usd,
     counted,
     estimate,
@@ -134,7 +136,7 @@ def test_a_model_without_a_price_under_a_budget_is_an_error_at_the_start():
 @in_a_loop
 async def test_a_budget_is_never_passed_and_stops_only_when_nothing_more_fits(limit, calls):
     budget = Budget(limit)
-    own = budget.of("m")
+    own = ModelBudget(budget)
     refused = []
 
     async def call(most, share, steps):
@@ -194,7 +196,7 @@ async def test_a_call_costs_no_more_than_was_held_once_a_reply_like_it_has_come(
     expected = Estimate(1000, 100, 100)
 
     budget = Budget(limit)
-    own = budget.of("m", Tariff(input=10.0, output=100.0))
+    own = ModelBudget(budget, Tariff(input=10.0, output=100.0))
     room = asyncio.Semaphore(width)
     longest, over_usd, under_way, answered = (0, 0), 0.0, 0, 0
 
@@ -231,7 +233,7 @@ amounts = st.one_of(st.none(), st.floats(), st.floats(0, 2))
 @in_a_loop
 async def test_what_was_spent_never_becomes_less_and_an_unknown_cost_is_the_dearest(calls):
     budget = Budget(1000.0)
-    own = budget.of("m")
+    own = ModelBudget(budget)
     for most, cost in calls:
         before = budget.spent_usd
         try:
@@ -246,7 +248,7 @@ async def test_what_was_spent_never_becomes_less_and_an_unknown_cost_is_the_dear
 
 @given(st.lists(st.tuples(st.integers(0, 5000), st.none() | st.integers(0, 10**9)), max_size=20))
 def test_what_is_learned_stays_within_bounds(counts):
-    own = Budget(1.0).of("m", Tariff(input=1.0, output=1.0))
+    own = ModelBudget(Budget(1.0), Tariff(input=1.0, output=1.0))
     expected = Estimate(1000, 100, 100)
     plain = own.most_usd(expected) or 0.0
     last = plain
@@ -338,17 +340,15 @@ def test_each_prompt_token_is_paid_once(price, fresh, cached, written, out):
     )
 
 
-@given(
-    st.lists(st.tuples(st.integers(1, 300_000), prices), max_size=3, unique_by=lambda t: t[0]),
-    prices,
-    st.integers(0, 400_000),
-    st.booleans(),
-)
-def test_the_highest_tier_below_the_prompt_holds(tiers, base, prompt, batched):
-    told = [Tier(above=n, **dict(p)) for n, p in sorted(tiers, key=lambda t: t[0])]
-    tariff = Tariff(**dict(base), tiers=tuple(told))
-    found = price_at(tariff, prompt, batched=batched)
-    assert found is [tariff, *(tier for tier in told if tier.above < prompt)][-1]
+def test_the_cost_of_a_prompt_beyond_the_price_is_unknown_and_none_is_sent_under_a_limit():
+    tariff = Tariff(input=1.0, output=1.0, up_to=1000)
+    for prompt, is_known in ((1000, True), (1001, False)):
+        usage = Usage(prompt_tokens=prompt, completion_tokens=1)
+        assert (cost_usd(tariff, Reply(text="a", usage=usage)) is not None) == is_known
+        expected = Estimate(prompt, 1, 1)
+        assert ModelBudget(Budget(), tariff).most_usd(expected) is not None
+        with contextlib.nullcontext() if is_known else pytest.raises(UnavailableError):
+            ModelBudget(Budget(1.0), tariff).most_usd(expected)
 
 
 @pytest.mark.parametrize(
@@ -379,7 +379,7 @@ def test_batches_cost_half_only_where_that_is_known(model_id, fields, is_half):
 @given(prices, st.integers(0, 10**6), st.integers(0, 10**5), st.data())
 def test_no_call_costs_more_than_the_most(price, prompt, completion, data):
     batched = data.draw(st.booleans())
-    tariff = Tariff(**dict(price), tiers=(Tier(above=100_000, input=50.0, output=60.0),))
+    tariff = Tariff(**dict(price))
     most = most_usd(tariff, prompt, completion, batched=batched)
     written = data.draw(st.integers(0, prompt))
     usage = Usage(prompt_tokens=prompt, completion_tokens=completion, cache_write_tokens=written)
@@ -388,21 +388,20 @@ def test_no_call_costs_more_than_the_most(price, prompt, completion, data):
 
 
 @pytest.mark.parametrize(
-    ("model_id", "prompt", "names"),
+    ("model_id", "up_to", "ending"),
     [
-        ("gemini/gemini-2.5-pro", 200_000, ("", "")),
-        ("gemini/gemini-2.5-pro", 200_001, ("_above_200k_tokens", "")),
-        ("openai/gpt-5.6", 300_000, ("_above_272k_tokens", "_batches")),
-        ("anthropic/claude-haiku-5-5", 100_001, ("_above_100k_tokens", "_batches")),
-        ("xai/grok-4.7", 10, ("", "")),
-        ("azure/gpt-4.1", 10, ("", "")),
+        ("gemini/gemini-2.5-pro", 200_000, ""),
+        ("openai/gpt-5.6", 272_000, "_batches"),
+        ("anthropic/claude-haiku-5-5", 100_000, "_batches"),
+        ("xai/grok-4.7", 200_000, ""),
+        ("azure/gpt-4.1", None, ""),
     ],
 )
-def test_tiers_batches_and_caches_are_priced_as_the_map_says(model_id, prompt, names):
+def test_batches_and_caches_are_priced_as_the_map_says(model_id, up_to, ending):
     entry = map_entry(config(model_id))
     known = tariff_of(config(model_id))
-    price = price_at(known, prompt, batched=bool(names[1]))
-    ending = "".join(names)
+    assert known.up_to == up_to
+    price = price_at(known, batched=bool(ending))
     assert price.input == pytest.approx(entry["input_cost_per_token" + ending] * 1e6)
     assert price.output == pytest.approx(entry["output_cost_per_token" + ending] * 1e6)
     assert price.cached == pytest.approx(entry["cache_read_input_token_cost" + ending] * 1e6)

@@ -16,7 +16,7 @@ from phyblock.errors import (
     UnavailableError,
     UnreachableError,
 )
-from phyblock.models.costs import Budget
+from phyblock.models.costs import Budget, ModelBudget
 from phyblock.models.model import (
     MOST_CONNECTION_FAILURES,
     ChatModel,
@@ -78,7 +78,7 @@ def ask_through(client, time, *, samples, width, was_heard=False):
             config=config,
             servers=servers,
             limits=limits,
-            budget=Budget().of("m"),
+            budget=ModelBudget(Budget()),
             policy=policy,
             report=lambda _: None,
         )

@@ -9,8 +9,6 @@ import socket
 from dataclasses import replace
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from phyblock.config.models import ModelConfig
 from phyblock.config.suite import Suite
@@ -26,7 +24,7 @@ from phyblock.errors import (
 from phyblock.models import client
 from phyblock.models.client import shown
 from phyblock.models.model import RetryPolicy
-from phyblock.models.request import Image, Message, json_body, wire_messages
+from phyblock.models.request import Image, wire_messages
 from phyblock.parsing.answer import choice_form
 from phyblock.parsing.move import move_form
 from phyblock.parsing.plan import plan_form
@@ -174,30 +172,6 @@ def test_how_closely_to_look_arrives_in_the_words_of_the_provider(
     assert looked_at(seen) == [arrives, arrives]
 
 
-texts = st.text(max_size=30)
-images = st.builds(
-    lambda magic, tail: Image(magic + tail, "goal", 8, 8),
-    st.sampled_from([PNG, JPEG, b"GIF89a", b"RIFF0000WEBP"]),
-    st.binary(max_size=40),
-)
-messages = st.builds(
-    Message,
-    st.sampled_from(["system", "user", "assistant"]),
-    st.lists(texts | images, min_size=1, max_size=5).map(tuple),
-)
-
-
-@settings(max_examples=200)
-@given(
-    st.lists(messages, max_size=4).map(tuple),
-    st.dictionaries(texts, texts, max_size=3),
-    st.sampled_from([None, "low", "high"]),
-)
-def test_a_body_made_around_the_encoder_says_what_the_encoder_would(content, fields, detail):
-    expected = {**fields, "messages": wire_messages(content, detail)}
-    assert json.loads(json_body(fields, content, detail)) == expected
-
-
 def test_only_pictures_are_sent_as_pictures():
     request = make_request(pictures=(b"<html>", picture(1)))
     with pytest.raises(DataError, match=r"'goal'.*is not a picture"):
@@ -313,19 +287,21 @@ def test_a_call_ends_as_the_server_ends_it(wire, route, mode):
 
 
 @pytest.mark.parametrize("route", ROUTES)
-@pytest.mark.parametrize("wish", ["7", "Wed, 21 Oct 2099 07:28:00 GMT"])
-def test_retry_after_is_read_as_seconds_and_as_a_date(wire, route, wish):
+@pytest.mark.parametrize(
+    ("wish", "seconds"), [("7", 7), ("Wed, 21 Oct 2099 07:28:00 GMT", None), ("nan", None)]
+)
+def test_retry_after_is_read_as_seconds(wire, route, wish, seconds):
     faults = Faults(mode="429", retry_after=wish)
     (answer,), _, _ = wire.ask(route, *seeded(1), faults=faults, policy=ONCE)
     assert isinstance(answer, RetryableError)
-    assert (answer.retry_after_s or 0) >= 7
+    assert answer.retry_after_s == seconds
 
 
 @pytest.mark.parametrize("route", [*OPENAI, "gemini"])
-def test_a_refused_seed_is_an_error_that_says_what_to_set(wire, route):
+def test_a_refused_seed_is_an_error_that_names_it(wire, route):
     (answer,), _, _ = wire.ask(route, *seeded(1), faults=Faults(mode="seed"))
     assert isinstance(answer, SampleError)
-    assert "set seed: never" in str(answer)
+    assert "seed" in str(answer)
     (answer,), _, _ = wire.ask(route, *seeded(1), faults=Faults(mode="seed"), seed="never")
     assert (answer.seed_sent, answer.attempts) == (False, 1)
 
@@ -452,8 +428,7 @@ def test_a_redirect_takes_nothing_anywhere(name):
         assert server.ended[mode] == 1, mode
         assert "is api_base the address" in str(answer)
         assert "h1dden" not in str(answer)
-        if mode.endswith("away"):
-            assert f"redirects to localhost:{elsewhere.port}," in str(answer)
+        assert "it redirects, and no redirect is followed" in str(answer)
 
 
 def test_both_transports_say_the_same_of_what_a_server_said(wire):
@@ -479,7 +454,7 @@ def unreachable(name, url, **fields):
 @pytest.mark.parametrize("name", ["direct", "openai", "vllm", "anthropic"])
 def test_a_name_that_is_not_known_is_not_called_a_lost_connection(name):
     said = unreachable(name, "http://no-such-host.invalid")
-    assert "DNS" in said
+    assert "no connection to no-such-host.invalid" in said
     assert "no-such-host.invalid" in said
 
 

@@ -78,23 +78,6 @@ def test_a_server_that_counts_more_than_is_expected_does_not_pass_the_limit_at_o
     assert spent(workspace) <= 5 * usd
 
 
-def test_a_model_is_asked_no_more_when_its_own_limit_is_reached(workspace):
-    with Running(OpenAIChat()) as running:
-        workspace.write_yaml("models.yaml", {
-            name: {"id": f"openai/{name}", "api_base": f"{running.url}/v1", "price": PRICE,
-                   "max_tokens": 100, "max_cost_usd": limit}
-            for name, limit in (("alpha", 3.2 * CALL_USD), ("beta", None))
-        })  # fmt: skip
-        workspace.write_suite(models=["alpha", "beta"])
-        done = workspace.run("--yes")
-        assert (done.code, "alpha was stopped: its max_cost_usd" in done.out) == (1, True)
-        asked = running.server.requests
-        assert 6 <= asked <= 8
-        workspace.run("--yes")
-        assert running.server.requests == asked
-    assert sum(record["model"] == "beta" for record in workspace.records()) == 5
-
-
 def test_a_dry_run_says_what_it_would_cost_and_asks_nothing(workspace):
     with Running(OpenAIChat()) as running:
         workspace.write_models(running.url, "alpha", price=PRICE, max_tokens=9000)
