@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import cast
 
 import click
-from click.core import ParameterSource
 
 from phyblock.cli.console import NAME_OR_PATH, UserPath, make_console, print_path
 
-_OF_RUN, _OF_SCENES, _OF_QUESTIONS = ("csv", "parquet", "hf"), ("hf",), ("hf", "vlmevalkit")
-_HELP = "Of a run: csv, parquet, hf; of scenes: hf; of questions: hf, vlmevalkit; else lmms-eval."
+_HELP = "Of a run: csv, hf; of scenes: hf; of questions: hf, vlmevalkit; else lmms-eval."
 
 
 @click.command()
@@ -31,12 +29,6 @@ _HELP = "Of a run: csv, parquet, hf; of scenes: hf; of questions: hf, vlmevalkit
     "--data", type=NAME_OR_PATH, default="phyblock-400", help="The scenes, and those of questions."
 )
 @click.option("--limit", type=click.IntRange(min=1), help="N, spread over levels or subtasks.")
-@click.option(
-    *("--size", "size_px"),
-    type=click.IntRange(128, 2048),
-    default=512,
-    help="Edge of a picture in pixels.",
-)
 def export(
     run: Path | None,
     form: str,
@@ -45,42 +37,36 @@ def export(
     out: Path | None,
     data: str,
     limit: int | None,
-    size_px: int,
 ) -> None:
     """Write the records of the folder RUN, or scenes or questions with their pictures, for other
     tools.
 
-    hf: Parquet and a card, for `datasets.load_dataset`. csv, parquet: one row per sample.
-    vlmevalkit: TSV files. lmms-eval: a folder for --include_path.
+    hf: Parquet and a card, for `datasets.load_dataset`. csv: one row per sample. vlmevalkit: a TSV
+    file. lmms-eval: a folder for --include_path.
     """
     from phyblock.integrations import files, huggingface
-    from phyblock.results.export import export_run
+    from phyblock.results.export import export_frame, write_csv
     from phyblock.results.load import load_run
 
-    if (run is not None) + scenes + (questions is not None) > 1:
+    named = (run is not None) + scenes + (questions is not None)
+    if named != (form != "lmms-eval"):
         raise click.UsageError("Name the folder of a run, --scenes or --questions.")
-    if run is None and not scenes and questions is None and form != "lmms-eval":
-        raise click.UsageError("Name the folder of a run, --scenes or --questions.")
-    if run is None and out is None:
-        raise click.UsageError("--out is missing: the folder to write.")
-    of_others = _OF_QUESTIONS if questions else ("lmms-eval",)
-    forms = _OF_RUN if run else _OF_SCENES if scenes else of_others
-    if form not in forms:
-        raise click.BadParameter(f"{form!r} is not one of {', '.join(forms)}.", param_hint="--to")
-    of_text = ("data", "size_px") if form == "lmms-eval" else ()
-    for name in ("data", "limit", "size_px") if run else of_text:
-        if click.get_current_context().get_parameter_source(name) != ParameterSource.DEFAULT:
-            option, kind = name.removesuffix("_px"), "a run" if run else form
-            raise click.UsageError(f"--{option} says nothing of {kind}: leave it out.")
+    makers: dict[str, Callable[[], Sequence[Path]]] = {}
     if run is not None:
-        write = huggingface.write_records if form == "hf" else partial(export_run, form=form)
-        made = write(load_run(run), folder=out)
+        loaded, folder = load_run(run), out or run / "export" / form
+        makers["csv"] = partial(write_csv, loaded, folder)
+        makers["hf"] = lambda: huggingface.write(folder, "records", export_frame(loaded))
+    elif out is None:
+        raise click.UsageError("--out is missing: the folder to write.")
     elif scenes:
-        made = huggingface.write_scenes(cast(Path, out), data, limit, size_px)
+        makers["hf"] = partial(huggingface.write_scenes, out, data, limit)
     elif questions is not None:
-        write_set = huggingface.write_questions if form == "hf" else files.write_vlmevalkit
-        made = write_set(cast(Path, out), questions, data, limit, size_px)
+        asked = (out, questions, data, limit)
+        makers["hf"] = partial(huggingface.write_questions, *asked)
+        makers["vlmevalkit"] = partial(files.write_vlmevalkit, *asked)
     else:
-        made = files.write_lmms_eval(cast(Path, out), limit)
-    for file in made:
+        makers["lmms-eval"] = partial(files.write_lmms_eval, out, limit)
+    if form not in makers:
+        raise click.BadParameter(f"{form!r} is not one of {', '.join(makers)}.", param_hint="--to")
+    for file in makers[form]():
         print_path(make_console(), file)

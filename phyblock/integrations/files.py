@@ -3,74 +3,53 @@
 from __future__ import annotations
 
 import base64
-import csv
 import functools
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import pandas as pd
 from PIL import Image
 
 from phyblock.api import Task, tasks
 from phyblock.domain.question import LETTERS, is_picture_option
-from phyblock.files import OutFolder, writing
+from phyblock.files import OutFolder
 from phyblock.integrations.huggingface import question_tasks
-
-TSV_FILES = MCQ_FILE, ORDERING_FILE = "PhyBlock_MCQ.tsv", "PhyBlock_Ordering.tsv"
-_COLUMNS = ("index", "question", *LETTERS, "answer", "category", "l2-category", "scene")
-_LMMS_TRACKS = ("full_planning", "pose_planning", "vqa")
-_LMMS_YAML = """task: phyblock_{track}
-dataset_path: json
-dataset_kwargs: {{data_files: {{test: {rows}}}}}
-test_split: test
-output_type: generate_until
-doc_to_visual: !function utils.doc_to_visual
-doc_to_text: !function utils.doc_to_text
-doc_to_target: key
-process_results: !function utils.process_results
-generation_kwargs: {{max_new_tokens: 4096, temperature: 0, do_sample: false}}
-metric_list:
-- {{metric: value, aggregation: mean, higher_is_better: true}}
-- {{metric: success, aggregation: mean, higher_is_better: true}}
-metadata: {{version: 1.0}}
-"""
-_LMMS_UTILS = """from phyblock.integrations.files import doc_to_text, doc_to_visual, process_results
-"""
 
 
 def write_vlmevalkit(
-    folder: Path, questions: str, data: str, limit: int | None, size_px: int
+    folder: Path, questions: str, data: str, limit: int | None, size_px: int = 512
 ) -> tuple[Path, ...]:
-    """Write questions as two TSV files, multiple choice and ordering; return the paths.
+    """Write multiple-choice questions as a TSV file, not those of ordering; return the paths.
 
-    In `$LMUData`, VLMEvalKit recognizes the first by its name as a multiple-choice set. Pictures
-    are base64; several are a list, with names in `image_path`. Raises StoreError if the folder
-    cannot be written or a file of others would be overwritten, DataError for an unreadable set or
-    picture.
+    In `$LMUData`, VLMEvalKit recognizes it by its name as a multiple-choice set. Pictures are
+    base64; several are a list, with names in `image_path`. Raises StoreError if the folder cannot
+    be written or a file of others would be overwritten, DataError for an unreadable set or picture.
     """
-    out = OutFolder(folder)
-    out.check(TSV_FILES)
-    with writing(folder), out.making() as made:
-        opened = [(made / name).open("w", newline="", encoding="utf-8") for name in TSV_FILES]
-        with opened[0], opened[1]:
-            writers = [csv.writer(file, delimiter="\t", lineterminator="\n") for file in opened]
-            for writer in writers:
-                writer.writerow((*_COLUMNS, "image", "image_path"))
-            for task in question_tasks(questions, data, limit, size_px):
-                asked, images = task.item.question, task.request().images
-                labels = [image.label for image in images]
-                coded = [base64.b64encode(image.data).decode() for image in images]
-                names = [f"{asked.id}-{label}.png" for label in labels]
-                # A picture is named by its place among the sent ones.
-                options = [
-                    f"Picture {labels.index(letter) + 1}" if is_picture_option(option) else option
-                    for letter, option in zip(LETTERS, asked.options, strict=True)
-                ]
-                about = (asked.subtask, asked.category, asked.scene.id)
-                sent = (repr(coded), repr(names)) if len(images) > 1 else (coded[0], names[0])
-                row = (asked.id, asked.text, *options, asked.answer_letters, *about, *sent)
-                writers[len(asked.answer) > 1].writerow(row)
-    return tuple(folder / name for name in TSV_FILES)
+    asked = question_tasks(questions, data, limit, size_px)
+    rows = [_choice(task) for task in asked if len(task.item.question.answer) == 1]
+    table = pd.DataFrame(rows).to_csv(sep="\t", index=False)
+    return OutFolder(folder).write({"PhyBlock_MCQ.tsv": table})
+
+
+def _choice(task: Task) -> dict[str, str]:
+    """Return a question as a row of VLMEvalKit."""
+    asked, images = task.item.question, task.request().images
+    labels = [image.label for image in images]
+    coded = [base64.b64encode(image.data).decode() for image in images]
+    names = [f"{asked.id}-{label}.png" for label in labels]
+    # A picture is named by its place among the sent ones.
+    options = [
+        f"Picture {labels.index(letter) + 1}" if is_picture_option(option) else option
+        for letter, option in zip(LETTERS, asked.options, strict=True)
+    ]
+    return {
+        **{"index": asked.id, "question": asked.text, **dict(zip(LETTERS, options, strict=True))},
+        **{"answer": asked.answer_letters, "category": asked.subtask},
+        **{"l2-category": asked.category, "scene": asked.scene.id},
+        "image": repr(coded) if len(images) > 1 else coded[0],
+        "image_path": repr(names) if len(images) > 1 else names[0],
+    }
 
 
 def write_lmms_eval(folder: Path, limit: int | None) -> tuple[Path, ...]:
@@ -78,15 +57,16 @@ def write_lmms_eval(folder: Path, limit: int | None) -> tuple[Path, ...]:
 
     Raises StoreError if the folder cannot be written.
     """
-    texts = {"utils.py": _LMMS_UTILS}
-    for track in _LMMS_TRACKS:
+    utils = f"from {__name__} import doc_to_text, doc_to_visual, process_results\n"
+    texts = {"utils.py": utils}
+    form = Path(__file__).with_name("lmms_eval.yaml").read_text(encoding="utf-8")
+    for track in ("full_planning", "pose_planning", "vqa"):
         rows = f"{track}.jsonl"
         place = json.dumps(str((folder / rows).absolute()))
-        texts[f"{track}.yaml"] = _LMMS_YAML.format(track=track, rows=place)
+        texts[f"{track}.yaml"] = form.format(track=track, rows=place)
         keys = (json.dumps({"track": track, "key": one.key}) for one in tasks(track, limit=limit))
         texts[rows] = "".join(f"{line}\n" for line in keys)
-    OutFolder(folder).write({name: text.encode() for name, text in texts.items()})
-    return tuple(folder / name for name in texts)
+    return OutFolder(folder).write(texts)
 
 
 _tasks = functools.cache(tasks)

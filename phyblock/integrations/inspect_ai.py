@@ -7,46 +7,26 @@ are those of a run and are made when a sample begins, so that a limit draws few 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Sequence
 from typing import Any
 
 from inspect_ai import Task as InspectTask
-from inspect_ai import model, task
+from inspect_ai import model, scorer, solver, task
 from inspect_ai.dataset import MemoryDataset, Sample
-from inspect_ai.scorer import (
-    Metric,
-    SampleScore,
-    Score,
-    Scorer,
-    Target,
-    grouped,
-    mean,
-    metric,
-    scorer,
-    stderr,
-)
-from inspect_ai.solver import Generate, Solver, TaskState, solver
 
 from phyblock.api import Split, Tasks, tasks
 
-_ROLES = {
-    "system": model.ChatMessageSystem,
-    "user": model.ChatMessageUser,
-    "assistant": model.ChatMessageAssistant,
-}
+_SAMPLING = {"temperature", "top_p", "max_tokens"}
 
 
-@metric
-def by_part() -> Metric:
+@scorer.metric
+def by_part() -> scorer.Metric:
     """Means by level or subtask and over all, with standard errors clustered by base scene."""
-    error = stderr(cluster="base_scene")
-    found = (
-        grouped(mean(), "part"),
-        grouped(error, "part", all_label="all stderr", name_template="{group_name} stderr"),
-    )
+    named = {"all_label": "all stderr", "name_template": "{group_name} stderr"}
+    means = scorer.grouped(scorer.mean(), "part")
+    errors = scorer.grouped(scorer.stderr(cluster="base_scene"), "part", **named)
 
-    def both(scores: list[SampleScore]) -> Any:
-        return {name: value for one in found for name, value in one(scores).items()}
+    def both(scores: list[scorer.SampleScore]) -> Any:
+        return {**means(scores), **errors(scores)}
 
     return both
 
@@ -94,7 +74,6 @@ def _task(
         several = levels if isinstance(levels, list | tuple) else [levels]
         levels = [int(one) if str(one).isdecimal() else one for one in several]
     asked = tasks(track, *found, split=split, levels=levels, seed=seed, data=data, limit=items)
-    sampling = asked.suite.sampling
     samples = [
         Sample(
             input=one.id,
@@ -107,41 +86,24 @@ def _task(
         dataset=MemoryDataset(samples, name=asked.name),
         solver=prompt_model(asked),
         scorer=phyblock_scorer(asked),
-        config=model.GenerateConfig(
-            temperature=sampling.temperature, top_p=sampling.top_p, max_tokens=sampling.max_tokens
-        ),
+        config=model.GenerateConfig(**asked.suite.sampling.model_dump(include=_SAMPLING)),
     )
 
 
-def _chat(messages: Sequence[dict[str, Any]]) -> list[model.ChatMessage]:
-    """Return messages in OpenAI's form as messages of Inspect."""
-
-    def content(parts: Any) -> Any:
-        if isinstance(parts, str):
-            return parts
-        return [
-            model.ContentText(text=part["text"])
-            if part["type"] == "text"
-            else model.ContentImage(image=part["image_url"]["url"])
-            for part in parts
-        ]
-
-    return [_ROLES[one["role"]](content=content(one["content"])) for one in messages]
-
-
-@solver
-def prompt_model(asked: Tasks) -> Solver:
+@solver.solver
+def prompt_model(asked: Tasks) -> solver.Solver:
     """Ask as in a run; play episodes to their end."""
 
-    async def solve(state: TaskState, generate: Generate) -> TaskState:
+    async def solve(state: solver.TaskState, generate: solver.Generate) -> solver.TaskState:
         one = asked[str(state.sample_id)]
         if not one.plays:
-            state.messages = _chat(await asyncio.to_thread(one.messages))
+            sent = await asyncio.to_thread(one.messages)
+            state.messages = await model.messages_from_openai(sent)
             return await generate(state)
         replies: list[str] = []
         episode = await asyncio.to_thread(one.episode)
         while not episode.done:
-            state.messages = _chat(episode.messages)
+            state.messages = await model.messages_from_openai(episode.messages)
             state = await generate(state)
             replies.append(state.output.completion)
             state.store.set("replies", list(replies))  # A limit may stop the sample at any turn.
@@ -151,16 +113,15 @@ def prompt_model(asked: Tasks) -> Solver:
     return solve
 
 
-@scorer(metrics={"*": [by_part()]})
-def phyblock_scorer(asked: Tasks) -> Scorer:
+@scorer.scorer(metrics={"*": [by_part()]})
+def phyblock_scorer(asked: Tasks) -> scorer.Scorer:
     """Score by the track's own judgement; `success` is 1 if everything is right."""
 
-    async def score(state: TaskState, target: Target) -> Score:
-        del target
+    async def score(state: solver.TaskState, _: scorer.Target) -> scorer.Score:
         one = asked[str(state.sample_id)]
         reply = state.store.get("replies") if one.plays else state.output.completion
         found = await asyncio.to_thread(one.score, reply)
-        return Score(
+        return scorer.Score(
             value={found.measure: found.value, "success": float(found.success)},
             answer=found.record.said,
             explanation=found.problem,

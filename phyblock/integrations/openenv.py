@@ -11,7 +11,6 @@ from __future__ import annotations
 import itertools
 import json
 import os
-import threading
 from collections.abc import Iterator
 from typing import Any
 
@@ -23,8 +22,6 @@ from openenv.core.env_server.types import Action, Observation, State
 
 from phyblock.api import Episode, Task, Tasks, tasks
 from phyblock.errors import Problem, SpecError
-
-_MOST_SESSIONS = 64
 
 
 class PhyBlockAction(Action):
@@ -41,29 +38,17 @@ class PhyBlockObservation(Observation):
     score: dict[str, Any] | None = None
 
 
-class TasksInTurn(Iterator[Task]):
-    """All tasks in order, repeated endlessly, shared by threads: each session gets the next."""
-
-    def __init__(self, known: Tasks) -> None:
-        self._lock = threading.Lock()
-        self._tasks = itertools.chain.from_iterable(itertools.repeat(known))
-
-    def __next__(self) -> Task:
-        with self._lock:
-            return next(self._tasks)
-
-
 class PhyBlockEnvironment(Environment[PhyBlockAction, PhyBlockObservation, State]):
     """One task per episode: a single turn, or several. Rewards sum to the score.
 
-    Environments with the same `in_turn` share the order of tasks.
+    Environments with the same `places` take tasks in turn.
     """
 
     SUPPORTS_CONCURRENT_SESSIONS = True
 
-    def __init__(self, known: Tasks, in_turn: TasksInTurn | None = None) -> None:
+    def __init__(self, known: Tasks, places: Iterator[int] | None = None) -> None:
         super().__init__()
-        self._known, self._in_turn, self._state = known, in_turn or TasksInTurn(known), State()
+        self._known, self._places, self._state = known, places or itertools.count(), State()
         self._task: Task | None = None
         self._episode: Episode | None = None
 
@@ -80,20 +65,16 @@ class PhyBlockEnvironment(Environment[PhyBlockAction, PhyBlockObservation, State
         """
         if key is not None:
             self._task = self._known[key]
-        elif seed is not None:
-            self._task = self._known[seed if self._known.is_endless else seed % len(self._known)]
         else:
-            self._task = next(self._in_turn)
+            place = next(self._places) if seed is None else seed
+            self._task = self._known[place if self._known.is_endless else place % len(self._known)]
         self._state = State(episode_id=episode_id)
         self._episode = self._task.episode() if self._task.plays else None
         first = self._episode.messages if self._episode else self._task.messages()
         return PhyBlockObservation(key=self._task.key, messages=tuple(first))
 
-    def step(
-        self, action: PhyBlockAction, timeout_s: float | None = None, **_: Any
-    ) -> PhyBlockObservation:
+    def step(self, action: PhyBlockAction, *_: Any, **__: Any) -> PhyBlockObservation:
         """Take a step with a reply. Raises RuntimeError before a reset and after the end."""
-        del timeout_s
         if self._task is None:
             raise RuntimeError("reset() begins a task")
         self._state.step_count += 1
@@ -122,9 +103,8 @@ class PhyBlockClient(EnvClient[PhyBlockAction, PhyBlockObservation, State]):
 
     def _parse_result(self, payload: dict[str, Any]) -> StepResult[PhyBlockObservation]:
         ends = {"reward": payload.get("reward"), "done": payload.get("done", False)}
-        return StepResult(
-            observation=PhyBlockObservation(**{**payload["observation"], **ends}), **ends
-        )
+        seen = PhyBlockObservation(**{**payload["observation"], **ends})
+        return StepResult(observation=seen, **ends)
 
     def _parse_state(self, payload: dict[str, Any]) -> State:
         return State(**payload)
@@ -134,28 +114,21 @@ def tasks_of_environment() -> Tasks:
     """Return the tasks of `PHYBLOCK_TASKS`. Raises SpecError if it is not valid."""
     text = os.environ.get("PHYBLOCK_TASKS", '{"track": "full_planning"}')
     try:
-        given = json.loads(text)
-    except ValueError:
-        given = None
-    if not isinstance(given, dict) or "track" not in given:
+        given = dict(json.loads(text))
+        track, overrides = given.pop("track"), given.pop("overrides", ())
+    except (ValueError, TypeError, KeyError):
         allowed = 'a JSON object: {"track": "full_planning", ...}'
-        raise SpecError(Problem("PHYBLOCK_TASKS", "names no track", "", text, allowed))
-    overrides = given.pop("overrides", ())
-    overrides = [overrides] if isinstance(overrides, str) else overrides
-    known = tasks(given.pop("track"), *overrides, **given)
-    if not (known.is_endless or len(known)):
-        raise SpecError(Problem("PHYBLOCK_TASKS", "leaves no task", "", text))
-    return known
+        raise SpecError(Problem("PHYBLOCK_TASKS", "names no track", "", text, allowed)) from None
+    return tasks(track, *overrides, **given)
 
 
 def app() -> Any:
     """Return the server; its sessions share the tasks and their order."""
-    known = tasks_of_environment()
-    in_turn = TasksInTurn(known)
+    known, places = tasks_of_environment(), itertools.count()
     return create_app(
-        lambda: PhyBlockEnvironment(known, in_turn),
+        lambda: PhyBlockEnvironment(known, places),
         PhyBlockAction,
         PhyBlockObservation,
         env_name="phyblock",
-        max_concurrent_envs=_MOST_SESSIONS,
+        max_concurrent_envs=64,
     )

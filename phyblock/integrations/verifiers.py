@@ -8,6 +8,7 @@ again.
 from __future__ import annotations
 
 import asyncio
+import functools
 from collections.abc import Iterator
 from typing import Any, Literal
 
@@ -47,19 +48,16 @@ class VerifiersData(vf.TaskData):
 class VerifiersTask(vf.Task[VerifiersData, vf.State, vf.TaskConfig]):
     """A task, with its rewards."""
 
-    asked: Task | None = None
-
-    def found(self) -> Task:
-        """Return the task of phyblock, made again for a stored trace."""
-        if self.asked is None:
-            self.asked = self.data.source.read()[self.data.place]
-        return self.asked
+    @functools.cached_property
+    def asked(self) -> Task:
+        """The task of phyblock, made again for a stored trace."""
+        task: Task = self.data.source.read()[self.data.place]
+        return task
 
     def worth(self, trace: vf.Trace) -> Score:
         """Return the score of the replies in a trace."""
-        asked = self.found()
         replies = [content_text(one.content) for one in trace.assistant_messages]
-        return asked.score(replies if asked.plays else replies[-1] if replies else None)
+        return self.asked.score(replies if self.asked.plays else replies[-1] if replies else None)
 
     @vf.reward
     async def value(self, trace: vf.Trace) -> float:
@@ -107,7 +105,7 @@ class VerifiersEnv(vf.Env[VerifiersEnvConfig]):
 
     async def run(self, task: VerifiersTask, agents: Any) -> None:
         """Run a task to its end."""
-        asked = task.found()
+        asked = await asyncio.to_thread(lambda: task.asked)
         if not asked.plays:
             await agents.agent.run(task)
             return
@@ -118,6 +116,5 @@ class VerifiersEnv(vf.Env[VerifiersEnvConfig]):
                 turn = await asyncio.to_thread(episode.step, segment.last_reply)
                 if turn.done:
                     break
-                segment = await interaction.turn(
-                    [one for one in turn.messages if one["role"] == "user"]
-                )
+                said = [one for one in turn.messages if one["role"] == "user"]
+                segment = await interaction.turn(said)

@@ -1,4 +1,4 @@
-"""Runs in the formats of other tools: CSV and Parquet."""
+"""The samples of a run as rows, for other tools."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any
 
 import pandas as pd
 
-from phyblock.files import OutFolder, needs, writing
+from phyblock.files import OutFolder
 from phyblock.records.files import RecordLines, read_prompts, record_types
 from phyblock.records.record import PictureMark, PromptMessage, Record
 from phyblock.results.load import TOKENS, Run, track_measures
@@ -91,24 +91,14 @@ def _row(
     return found
 
 
-def export_run(run: Run, form: str, folder: Path | None = None) -> tuple[Path, ...]:
-    """Write a run as `csv` or `parquet` into `folder` (export/FORMAT in the run's).
+def write_csv(run: Run, folder: Path) -> tuple[Path, ...]:
+    """Write the rows of a run as `records.csv`, lists as JSON; return its path.
 
-    Lists are JSON in CSV. Raises StoreError if the folder cannot be written or holds a file of that
-    name that phyblock did not write, SpecError if pyarrow is missing.
+    Raises StoreError if the folder cannot be written or holds a file of that name that phyblock did
+    not write.
     """
-    out = OutFolder(folder or run.path)
-    below = "" if folder else f"export/{form}/"
-    target = out.path / below
-    if form == "parquet":
-        needs("pyarrow", "hf", form)
-    with writing(target), out.making(below) as made:
-        frame = export_frame(run)
-        if form == "parquet":
-            frame.to_parquet(made / "records.parquet", index=False, engine="pyarrow")
-            return (target / "records.parquet",)
-        for name in ("levels", "parents", "plan"):
-            as_json = [json.dumps(v) if isinstance(v, list) else v for v in frame[name]]
-            frame[name] = pd.Series(as_json, dtype="object")
-        (made / "records.csv").write_bytes(to_csv(frame).encode("utf-8", "replace"))
-        return (target / "records.csv",)
+    frame = export_frame(run)
+    for name in ("levels", "parents", "plan"):
+        as_json = [json.dumps(v) if isinstance(v, list) else v for v in frame[name]]
+        frame[name] = pd.Series(as_json, dtype="object")
+    return OutFolder(folder).write({"records.csv": to_csv(frame)})

@@ -15,7 +15,7 @@ from phyblock.cli.console import make_console, print_table
 from phyblock.cli.progress import ProgressView
 from phyblock.models.model import ModelEvent
 from phyblock.records.files import known_records
-from phyblock.results.export import export_run
+from phyblock.results.export import write_csv
 from phyblock.results.load import load_run
 from phyblock.results.tables import write_tables
 from phyblock.results.text import Column, TextTable
@@ -87,7 +87,7 @@ def test_no_cell_of_any_csv_is_a_formula(tmp_path):
     facts["suite"]["models"] = ["alpha"]
     folder = write_run(tmp_path / "run", records, facts)
     written = write_tables(folder)
-    exported = export_run(load_run(folder), "csv")
+    exported = write_csv(load_run(folder), folder / "export")
     checked = 0
     for path in (*written.files, *exported):
         if path.suffix == ".csv":

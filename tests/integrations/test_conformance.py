@@ -156,16 +156,16 @@ def test_verifiers(official_checkout, expected):
     check(official_checkout, expected, score)
     assert VerifiersTaskset(VerifiersConfig(limit=None)).INFINITE
     stored = type(by_key["000"])(by_key["000"].data)
-    assert stored.found().key == "000"
+    assert stored.asked.key == "000"
     for limit in (3, None):
         drawn = VerifiersTaskset(VerifiersConfig(split="train", levels=[1], seed=2, limit=limit))
         for task in itertools.islice(drawn, 3):
-            assert type(task)(task.data).found().key == task.data.id
+            assert type(task)(task.data).asked.key == task.data.id
 
 
 def test_openenv(official_checkout, known, expected):
     pytest.importorskip("openenv", reason="openenv is not installed")
-    from phyblock.integrations.openenv import PhyBlockAction, PhyBlockEnvironment, TasksInTurn
+    from phyblock.integrations.openenv import PhyBlockAction, PhyBlockEnvironment
 
     environment = PhyBlockEnvironment(known)
 
@@ -179,8 +179,8 @@ def test_openenv(official_checkout, known, expected):
     stream = phyblock.tasks("full_planning", split="train", levels=[1], seed=2)
     for source in (stream, known[:3]):
         keys = [one.key for one in itertools.islice(source, 3)]
-        in_turn = TasksInTurn(source)
-        several = [PhyBlockEnvironment(source, in_turn) for _ in keys]
+        places = itertools.count()
+        several = [PhyBlockEnvironment(source, places) for _ in keys]
         assert [one.reset().key for one in several] == keys
         assert several[0].reset(seed=1).key == keys[1]
     assert several[1].reset().key == keys[0]
@@ -194,7 +194,7 @@ def test_tasks_of_an_environment(text, monkeypatch):
     monkeypatch.setenv("PHYBLOCK_TASKS", text)
     with pytest.raises(SpecError, match="PHYBLOCK_TASKS"):
         tasks_of_environment()
-    given = {"track": "full_planning", "overrides": "images.size_px=128", "limit": 2}
+    given = {"track": "full_planning", "overrides": ["images.size_px=128"], "limit": 2}
     monkeypatch.setenv("PHYBLOCK_TASKS", json.dumps(given))
     assert len(tasks_of_environment()) == 2
 

@@ -13,7 +13,7 @@ from PIL import Image as PillowImage
 from phyblock.domain.question import LETTERS, is_picture_option
 from phyblock.integrations import huggingface
 from phyblock.integrations.files import write_vlmevalkit
-from phyblock.results.export import export_frame, export_run
+from phyblock.results.export import export_frame, write_csv
 from phyblock.results.load import load_run
 from tests.web.factory import LEVELS, manifest, record, score, write_run
 from tests.workspace import csv_rows
@@ -72,10 +72,12 @@ def test_rows_hold_what_was_asked_answered_and_counted(folder):
     assert frame.loc["full_planning/beta/000/s0", "error"] == "busy"
 
 
-def test_csv_and_parquet_come_back_as_the_same_rows(folder):
+def test_csv_and_parquet_come_back_as_the_same_rows(folder, tmp_path):
     run = load_run(folder)
-    (csv,), (parquet,) = export_run(run, "csv"), export_run(run, "parquet")
-    assert csv == folder / "export" / "csv" / "records.csv"
+    (csv,), (parquet, _) = (
+        write_csv(run, tmp_path),
+        huggingface.write(tmp_path, "records", export_frame(run)),
+    )
     from_csv, from_parquet = pd.read_csv(csv), pd.read_parquet(parquet)
     assert from_csv["sample"].tolist() == from_parquet["sample"].tolist()
     assert from_csv["tp_a"].fillna(-1).tolist() == from_parquet["tp_a"].fillna(-1).tolist()
@@ -85,8 +87,7 @@ def test_csv_and_parquet_come_back_as_the_same_rows(folder):
 def test_a_hugging_face_dataset_has_the_right_rows(folder, tmp_path):
     datasets = pytest.importorskip("datasets", reason=HF)
     frame = export_frame(load_run(folder))
-    parquet, _ = huggingface.write_records(load_run(folder))
-    assert parquet == folder / "export" / "hf" / "records.parquet"
+    parquet, _ = huggingface.write(tmp_path / "hf", "records", frame)
     cache = str(tmp_path / "cache")
     for rows in [datasets.load_dataset(str(parquet.parent), cache_dir=cache, split="train")]:
         assert rows.column_names == list(frame.columns)
@@ -97,15 +98,17 @@ def test_a_hugging_face_dataset_has_the_right_rows(folder, tmp_path):
         assert rows["answer_correct"][-2:] == [True, False]
 
 
-def test_tsv_files_are_as_vlmevalkit_reads_them(question_set, towers, tmp_path):
+def test_a_tsv_file_is_as_vlmevalkit_reads_it(question_set, towers, tmp_path):
     out, asked_of = tmp_path / "out", str(question_set.root)
-    files = write_vlmevalkit(out, asked_of, str(towers.root), None, 128)
+    (file,) = write_vlmevalkit(out, asked_of, str(towers.root), None, 128)
     csv.field_size_limit(10**8)
-    choice, ordering = (csv_rows(file, delimiter="\t") for file in files)
+    rows = csv_rows(file, delimiter="\t")
     asked = {task.key: task.question for task in question_set.tasks}
-    assert {row["index"] for row in (*choice, *ordering)} == set(asked)
-    assert len(choice) + len(ordering) == len(asked)
-    for row in (*choice, *ordering):
+    # Its multiple choice cannot score an order.
+    choices = [key for key, question in asked.items() if len(question.answer) == 1]
+    assert [row["index"] for row in rows] == choices
+    assert len(choices) < len(asked)
+    for row in rows:
         question = asked[row["index"]]
         assert row["answer"] == question.answer_letters
         assert (row["category"], row["l2-category"]) == (question.subtask, question.category)
@@ -125,8 +128,6 @@ def test_tsv_files_are_as_vlmevalkit_reads_them(question_set, towers, tmp_path):
                 assert names[place] == f"{question.id}-{letter}.png"
             else:
                 assert row[letter] == option
-    assert all(len(row["answer"]) == 1 for row in choice)
-    assert all(len(row["answer"]) == 4 for row in ordering)
 
 
 def test_a_hugging_face_dataset_has_questions_and_pictures(question_set, towers, tmp_path):
