@@ -52,8 +52,8 @@ from phyblock.registry import added_measures, known_track, known_tracks
 from phyblock.results.load import Run, load_run
 from phyblock.run.estimate import may_bill
 from phyblock.run.judge import begun, judge_episode, judge_reply
-from phyblock.run.plan import find_models_file, make_plan, read_suite
-from phyblock.run.runner import RunEvent, Session, Stopping, check_ready, completed, remarks_on
+from phyblock.run.plan import check_models, find_models_file, make_plan, read_suite
+from phyblock.run.runner import RunEvent, Session, Stopping, completed, remarks_on
 from phyblock.sim.pictures import PictureStyle, candidates_png, composite_png, goal_png, goal_style
 from phyblock.text import counted, did_you_mean, well_formed
 from phyblock.tracks.base import Track, open_tracks
@@ -619,7 +619,7 @@ def run_suite(
     known = load_models(find_models_file(named, loaded.files.path))
     plan = make_plan(loaded, known, only=models or (), limit=limit)
     folder = plan.folder_in(Path("results")) if out is None else Path(out)
-    check_ready(plan)
+    check_models(plan.models)
     asks: dict[str, Any] = {"use_cache": use_cache, "retry_failed": retry_failed}
     is_agreed = yes or plan.suite.limits.max_cost_usd is not None
     if costly := [] if is_agreed else may_bill(plan, folder, **asks):

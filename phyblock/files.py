@@ -148,49 +148,37 @@ def read_picture(path: Path) -> bytes:
     """Return the bytes of a picture file. Raises DataError if it cannot be decoded."""
     try:
         data = read_bytes(path, LARGEST_PICTURE_BYTES)
-    except OSError as error:
-        raise DataError(_damaged(str(path), reason_of(error))) from error
-    except ValueError as error:
-        raise DataError(_damaged(str(path), f"it {error}")) from error
-    digest = hashlib.sha256(data).digest()
-    if digest not in _DECODED:
-        decode_picture(data, str(path)).close()
-        _DECODED.add(digest)
+        digest = hashlib.sha256(data).digest()
+        if digest not in _DECODED:
+            with open_picture(data, str(path)) as picture:
+                picture.load()
+            _DECODED.add(digest)
+    except DataError:
+        raise
+    except Exception as error:
+        # Hostile bytes can make the decoder fail in any way.
+        message = f"is not a readable picture: {reason_of(error)}"
+        raise DataError(Problem(str(path), message, allowed=_PICTURES_ALLOWED)) from error
     return data
 
 
-def decode_picture(data: bytes, where: str) -> Image:
-    """Decode the first frame of an encoded picture. Raises DataError, at `where`, for a bad one."""
-    picture = _open_picture(data, where)
-    try:
-        picture.load()
-    except Exception as error:
-        # Hostile bytes can make the decoder fail in any way.
-        picture.close()
-        raise DataError(_damaged(where, reason_of(error))) from error
-    return picture
+def open_picture(data: bytes, where: str) -> Image:
+    """Open the first frame of an encoded picture, which is decoded when its pixels are needed.
 
-
-def picture_size(data: bytes, where: str) -> tuple[int, int]:
-    """Return width and height [pixels] from a picture's header. Raises DataError for a bad one."""
-    with _open_picture(data, where) as picture:
-        return picture.width, picture.height
-
-
-def _open_picture(data: bytes, where: str) -> Image:
+    Raises DataError, at `where`, for another format or a bad size.
+    """
     # Decoders of other formats start programs (EPS starts Ghostscript) or are seldom maintained.
-    from PIL import Image, UnidentifiedImageError
+    from PIL import Image
 
     try:
         with warnings.catch_warnings():
             # Sizes are checked below.
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
             picture = Image.open(io.BytesIO(data), formats=_PICTURE_FORMATS)
-    except UnidentifiedImageError as error:
-        found = f"a file that begins with {data[:12]!r}" if data else "an empty file"
-        raise DataError(Problem(where, "is not a picture", "", found, _PICTURES_ALLOWED)) from error
     except Exception as error:
-        raise DataError(_damaged(where, reason_of(error))) from error
+        found = f"a file that begins with {data[:12]!r}" if data else "an empty file"
+        message = f"is not a readable picture: {reason_of(error)}"
+        raise DataError(Problem(where, message, "", found, _PICTURES_ALLOWED)) from error
     width, height = picture.size
     small, large = min(width, height), max(width, height)
     if small < _LEAST_SIDE_PX or large > _MOST_SIDE_PX or small * large > _MOST_PIXELS:
@@ -198,10 +186,6 @@ def _open_picture(data: bytes, where: str) -> Image:
         found, too_large = f"{width:,} x {height:,} pixels", "is a picture of a bad size"
         raise DataError(Problem(where, too_large, "", found, _SIZES_ALLOWED))
     return picture
-
-
-def _damaged(where: str, why: str) -> Problem:
-    return Problem(where, f"is not a readable picture: {why}", allowed=_PICTURES_ALLOWED)
 
 
 @contextlib.contextmanager

@@ -21,7 +21,7 @@ _SECTIONS = {
     "Run": {
         "init": (f"{_CLI}.setup:init", "Create a folder: a suite, models.yaml, prompts."),
         "validate": (f"{_CLI}.setup:validate", "Check suites, models files and data sets."),
-        "models": (f"{_CLI}.setup:models", "List models with prices and keys; check one."),
+        "models": (f"{_CLI}.setup:models", "List models with prices and keys."),
         "run": (f"{_CLI}.run:run", "Run a suite, or continue where it stopped."),
         "play": (f"{_CLI}.run:play", "Answer a suite yourself, in a browser."),
         "score": (f"{_CLI}.run:score", "Score stored replies again; calls no model."),
@@ -130,8 +130,6 @@ def main() -> None:
         error.show()
         if "unexpected extra argument" in error.format_message():
             click.echo(f"Hint: {QUOTE_HINT}", err=True)
-        elif isinstance(error, click.NoSuchOption):
-            click.echo(f"Hint: {_set_hint(error.option_name)}", err=True)
         sys.exit(2)
     except click.Abort:
         click.echo("Interrupted.", err=True)
@@ -152,17 +150,6 @@ def main() -> None:
         show_problems(StoreError(Problem(where, f"cannot be used: {reason_of(error)}")))
         sys.exit(2)
     sys.exit(code if isinstance(code, int) else 0)
-
-
-def _set_hint(option: str) -> str:
-    """Return a hint on --set for an unknown option that is a field of a suite."""
-    from phyblock.config.suite import suite_model
-
-    name = option.lstrip("-").replace("-", "_")
-    known, form = suite_model().model_fields.get(name), "KEY=VALUE"
-    if known is not None:
-        form = f"'{name}=[...]'" if isinstance(known.default, tuple) else f"{name}=VALUE"
-    return f"fields of the suite are set with --set {form}"
 
 
 def _drop_output() -> None:

@@ -50,12 +50,12 @@ from phyblock.run.manifest import code_versions
 from phyblock.run.plan import (
     RunPlan,
     bundled_suites,
+    check_models,
     find_models_file,
     make_plan,
-    prompt_remarks,
     read_suite,
 )
-from phyblock.run.runner import RunResult, Session, check_ready, completed, remarks_on
+from phyblock.run.runner import RunResult, Session, completed, remarks_on
 from phyblock.run.store import held_run
 from phyblock.text import counted, one_line, some_of
 from phyblock.tracks.base import kind_of
@@ -120,11 +120,8 @@ def run(
     asks: dict[str, Any] = {"use_cache": not no_cache, "retry_failed": retry_failed}
     if dry_run:
         print_estimate(console, plan, estimate(plan, folder, **asks))
-    for remark in prompt_remarks(loaded, plan):
-        console.print(remark, style="dim")
-    if dry_run:
         return 0
-    check_ready(plan)
+    check_models(plan.models)
     rows = [] if yes else may_bill(plan, folder, **asks)
     if not may_spend(
         [row.model.name for row in rows if row.may_cost],
@@ -196,7 +193,7 @@ def print_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) ->
         "in batches": lambda row: f"{row.waiting:,}",
         "calls": lambda row: f"{row.calls:,}",
         "tokens in": lambda row: f"{row.prompt_tokens:,}",
-        "tokens out": lambda row: f"{row.replies[0]:,.0f}",
+        "tokens out": lambda row: f"{row.reply_tokens:,}",
         "cost": lambda row: _dollars(row.cost_usd) if row.calls else NO_VALUE,
         "at most": lambda row: _dollars(row.most_usd) if row.calls else NO_VALUE,
     }
@@ -212,14 +209,13 @@ def print_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) ->
     if left:
         notes = (
             "Tokens are estimates: texts by their words, pictures by the provider's rule, replies "
-            "as long as the model's earlier ones, or of usual length if there are none. At most: "
-            "every reply is as long as its limit allows.",
+            "of usual length. At most: every reply is as long as its limit allows.",
         )
     print_table(
         console, TextTable(f"{plan.suite.name}: {', '.join(facts)}", headings, lines, notes)
     )
     known = [row for row in left if row.cost_usd is not None]
-    prompts, replies = sum(r.prompt_usd for r in known), sum(r.replies[1] for r in known)
+    prompts, replies = sum(r.prompt_usd for r in known), sum(r.reply_usd for r in known)
     parts = f" (prompts {_dollars(prompts)}, replies {_dollars(replies)})" if known else ""
     costs = [f"about {_dollars(prompts + replies)}{parts}"] if known or not left else []
     if unknown := len(left) - len(known):

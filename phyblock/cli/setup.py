@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import asyncio
-import io
 import os
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import click
@@ -14,20 +12,17 @@ import click
 from phyblock.cli.console import (
     UserPath,
     make_console,
-    may_spend,
     models_file_option,
     print_path,
     print_rows,
     sets_option,
     shown_path,
-    yes_option,
 )
 from phyblock.config.models import (
     GROUP,
     RECORDED,
     ModelConfig,
     group_names,
-    host_of,
     load_models,
     with_members,
 )
@@ -35,20 +30,19 @@ from phyblock.config.suite import Suite, suite_model
 from phyblock.config.yaml import read_yaml
 from phyblock.data.lookup import read_data_set
 from phyblock.data.scenes import SCENES_FILE
-from phyblock.errors import InputError, ModelError, Problem, SpecError
+from phyblock.errors import InputError, Problem, SpecError
 from phyblock.files import bundled, check_free, writing
 from phyblock.registry import baseline_names
 from phyblock.run.plan import (
     bundled_suites,
+    check_models,
     find_models_file,
     find_suite,
     make_plan,
-    model_problems,
-    prompt_remarks,
     read_suite,
     to_config,
 )
-from phyblock.text import counted, did_you_mean
+from phyblock.text import counted
 from phyblock.tracks.base import kind_of
 
 _FILES = (
@@ -111,19 +105,17 @@ def validate(files: tuple[Path, ...], sets: tuple[str, ...], models_file: str | 
     problems: list[Problem] = []
     for path in files:
         try:
-            summary, *remarks = _check(path, sets, models_file)
+            summary = _check(path, sets, models_file)
         except InputError as error:
             problems += error.problems
         else:
             console.print(f"{shown_path(path)}: {summary}")
-            for remark in remarks:
-                console.print(f"  {remark}")
     if problems:
         raise InputError(problems)
 
 
-def _check(path: Path, sets: tuple[str, ...], models_file: str | None) -> list[str]:
-    """Return a description of a valid file, and remarks."""
+def _check(path: Path, sets: tuple[str, ...], models_file: str | None) -> str:
+    """Return a description of a valid file."""
     if os.path.isdir(path) or path.name == SCENES_FILE:
         dataset = read_data_set(str(path))
         levels = sorted({n for task in dataset.tasks for n in task.scene.levels})
@@ -131,7 +123,7 @@ def _check(path: Path, sets: tuple[str, ...], models_file: str | None) -> list[s
             f"{sum(n in task.scene.levels for task in dataset.tasks)} of level {n}" for n in levels
         )
         scenes = counted(len(dataset.tasks), "scene")
-        return [f"data set {dataset.name}, {scenes} ({by_level})"]
+        return f"data set {dataset.name}, {scenes} ({by_level})"
     path = find_suite(str(path))
     data = read_yaml(path).data
     if isinstance(data, dict) and isinstance(data.get("blocks"), list):
@@ -143,32 +135,27 @@ def _check(path: Path, sets: tuple[str, ...], models_file: str | None) -> list[s
         named = find_models_file(models_file, path)
         known = load_models(named)
         asked = () if suite.models == RECORDED else suite.models
-        if problems := list(model_problems(named, known, asked)):
-            raise SpecError(problems)
+        names = [name for name in with_members(asked, known) if name in known]
+        check_models([known[name] for name in names], read_yaml(named))
         plan = make_plan(suite, known)
         models = counted(len(plan.models), "model")
         samples = f"{counted(plan.samples_per_model, 'sample')} a model"
-        return [f"suite {suite.name}, {models}, {samples}", *prompt_remarks(suite, plan)]
+        return f"suite {suite.name}, {models}, {samples}"
     known = load_models(path)
-    if problems := list(model_problems(path, known, known)):
-        raise SpecError(problems)
+    check_models(known.values(), read_yaml(path))
     if not known:
         allowed = "a suite, or a models file with name: provider/model lines"
         raise SpecError(Problem(str(path), "is empty", allowed=allowed))
-    return [f"models file, {counted(len(known), 'model')}"]
+    return f"models file, {counted(len(known), 'model')}"
 
 
-@click.group(invoke_without_command=True)
+@click.command()
 @models_file_option
-@click.pass_context
-def models(ctx: click.Context, models_file: str | None) -> None:
-    """List the models that suites may name, by groups; `check NAME` makes one tiny call."""
+def models(models_file: str | None) -> None:
+    """List the models that suites may name, by groups."""
     from phyblock.models.costs import tariff_of
     from phyblock.models.keys import api_key_status
 
-    if ctx.invoked_subcommand is not None:
-        ctx.obj = models_file
-        return
     path = find_models_file(models_file, None)
     known = load_models(path)
     console = make_console()
@@ -180,7 +167,9 @@ def models(ctx: click.Context, models_file: str | None) -> None:
         groups["in no group" if len(others) < len(known) else "models"] = others
     for title, names in groups.items():
         rows: list[tuple[str, ...]] = []
-        for name, config in ((name, _config(name, known)) for name in names):
+        suite = Suite(name="models", models=("random",))
+        for name in names:
+            config = to_config(name, known.get(name, ModelConfig(name=name)), suite)
             if config.kind != "litellm":
                 rows.append((name, str(config.recording or config.kind), "", "0, 0"))
                 continue
@@ -191,78 +180,3 @@ def models(ctx: click.Context, models_file: str | None) -> None:
             rows.append((name, config.id, key, price))
         print_rows(console, (title, "id", "key", "$/M in, out"), rows, numbers=1)
     console.print(f"{counted(len(known), 'model')} in {shown_path(path)}")
-
-
-def _config(name: str, known: Mapping[str, ModelConfig]) -> ModelConfig:
-    model = known.get(name, ModelConfig(name=name))
-    return to_config(name, model, Suite(name="models", models=(name,)))
-
-
-@models.command()
-@click.argument("name")
-@models_file_option
-@yes_option
-@click.pass_obj
-def check(of_group: str | None, name: str, models_file: str | None, yes: bool) -> int:
-    """Make one tiny call to each server of the model NAME, and print the answer."""
-    from phyblock.models.costs import is_billed
-    from phyblock.models.litellm_client import be_quiet
-
-    known = load_models(find_models_file(models_file or of_group, None))
-    names = [*baseline_names(), *known]
-    if name not in names:
-        hint = did_you_mean(name, names) or "list them: phyblock models"
-        raise SpecError(Problem("models check", "is not in the models file", "", name, hint=hint))
-    console = make_console()
-    config = _config(name, known)
-    if config.kind != "litellm":
-        console.print(f"{name} is a {config.kind}: it makes no calls.")
-        return 0
-    addresses = config.addresses or (None,)
-    calls = counted(len(addresses), "call")
-    billed = [name] if is_billed(config) and not yes else []
-    if not may_spend(billed, lambda: console.print(f"{name} may bill {calls} of some 100 tokens.")):
-        console.print("Nothing was asked.")
-        return 1
-    be_quiet()
-    code = 0
-    for address in addresses:
-        server = f"{name} at {host_of(address)}" if address and len(addresses) > 1 else name
-        try:
-            answer = asyncio.run(_ask_tiny(config.at(address)))
-        except ModelError as error:
-            console.print(f"{server} failed the check: {error}", style="red")
-            code = 1
-        else:
-            console.print(f"{server} answers: {answer}")
-    return code
-
-
-async def _ask_tiny(config: ModelConfig) -> str:
-    """Show the model a small red square and ask for its color; one attempt, nothing cached.
-
-    Raises the ModelError of the call, or SpecError or DataError if the model cannot be built.
-    """
-    from PIL import Image as PillowImage
-
-    from phyblock.models.model import RetryPolicy, build_model
-    from phyblock.models.request import Image, Message, Request
-
-    side_px, buffer = 64, io.BytesIO()
-    PillowImage.new("RGB", (side_px, side_px), (216, 49, 49)).save(buffer, "PNG")
-    picture = Image(buffer.getvalue(), "check", side_px, side_px)
-    question = "What color is this picture? Answer with one word."
-    request = Request("check", 0, (Message("user", (picture, question)),), {}, "", None)
-    alone = config.model_copy(update={"seed": "never", "batch": False})
-    model = build_model(alone, cache=None, policy=RetryPolicy(attempts=1, retry_for_s=0.0))
-    try:
-        reply = await model.ask(request)
-    finally:
-        await model.aclose()
-    if reply is None or not reply.text.strip():
-        ended = f" (it ended by: {reply.finish})" if reply else ""
-        raise ModelError(f"the reply is empty{ended}")
-    usage = reply.usage
-    tokens = f"{usage.prompt_tokens or '?'} + {usage.completion_tokens or '?'} tokens"
-    cost = "cost unknown" if reply.cost_usd is None else f"${reply.cost_usd:.6f}"
-    return f"{reply.text.strip()[:80]!r} in {reply.latency_s:.1f} s, {tokens}, {cost}"

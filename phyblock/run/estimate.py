@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections import Counter, defaultdict
 from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 
 from phyblock.config.models import ModelConfig, Tariff
-from phyblock.config.suite import Variant
 from phyblock.files import reply_cache_file
 from phyblock.models.cache import ReplyCache, reply_key
 from phyblock.models.costs import Estimate as CallEstimate
@@ -20,9 +18,6 @@ from phyblock.models.request import Image, Request
 from phyblock.records.files import BatchLines, run_records
 from phyblock.run.plan import RunPlan, Sample
 from phyblock.run.store import held_run
-
-_ENOUGH_REPLIES = 20
-"""Number of replies from which their mean length is the estimate."""
 
 
 @dataclass
@@ -42,49 +37,28 @@ class Estimate:
     waiting: int = 0
     calls: int = 0
     prompt_tokens: int = 0
+    reply_tokens: int = 0
     prompt_usd: float = 0.0
+    reply_usd: float = 0.0
     _most_usd: float = 0.0
-    _known: defaultdict[str, list[int]] = field(default_factory=lambda: defaultdict(list))
-    """Tokens of existing replies, by kind of question."""
-    _coming: Counter[tuple[str, int, int, float]] = field(default_factory=Counter)
-    """Calls by kind, tokens of a typical and of the longest reply, and dollars per token."""
 
-    def add_call(self, expected: CallEstimate, kind: str) -> None:
-        """Count one call to be made, for a kind of question."""
+    def add_call(self, expected: CallEstimate) -> None:
+        """Count one call to be made, with a reply of typical length."""
         self.calls += 1
-        self.prompt_tokens += expected.prompt_tokens
-        usual, most, reply_usd = expected.completion_tokens, expected.most_completion_tokens, 0.0
+        prompt, reply = expected.prompt_tokens, expected.completion_tokens
+        self.prompt_tokens += prompt
+        self.reply_tokens += reply
         if self.tariff is not None:
-            prompt, batched = expected.prompt_tokens, self.model.batch
+            batched, most = self.model.batch, expected.most_completion_tokens
             price = price_at(self.tariff, batched=batched)
-            reply_usd = price.output / 1_000_000
             self.prompt_usd += prompt * price.input / 1_000_000
+            self.reply_usd += reply * price.output / 1_000_000
             self._most_usd += most_usd(self.tariff, prompt, most, batched=batched)
-        self._coming[kind, usual, most, reply_usd] += 1
-
-    def add_reply(self, completion_tokens: int | None, kind: str) -> None:
-        """Learn from an existing reply to a kind of question."""
-        if completion_tokens is not None:
-            self._known[kind].append(completion_tokens)
-
-    @property
-    def replies(self) -> tuple[float, float]:
-        """Tokens and dollars of future replies: with the mean length of existing replies of their
-        kind, if there are enough, up to the longest possible; else with the typical length.
-        """
-        tokens = usd = 0.0
-        for (kind, usual, most, token_usd), calls in self._coming.items():
-            known = self._known.get(kind, [])
-            is_enough = len(known) >= _ENOUGH_REPLIES
-            length = min(sum(known) / len(known), most) if is_enough else usual
-            tokens += length * calls
-            usd += length * token_usd * calls
-        return tokens, usd
 
     @property
     def cost_usd(self) -> float | None:
         """Dollars for the calls."""
-        return None if self.tariff is None else self.prompt_usd + self.replies[1]
+        return None if self.tariff is None else self.prompt_usd + self.reply_usd
 
     @property
     def most_usd(self) -> float | None:
@@ -112,9 +86,6 @@ def estimate(
     if held_run(folder, plan.manifest) is not None:
         for _, record in run_records(folder, plan.manifest, plan.sample_ids()):
             settled[record.sample] = record.is_answered if retry_failed else record.is_final
-            kind = _kind(record.track, record.way)
-            for reply in record.replies:
-                rows[record.model].add_reply(reply.usage.completion_tokens, kind)
         if lines := tuple(line for _, line in BatchLines(folder)):
             from phyblock.models.batch import under_way
 
@@ -127,19 +98,16 @@ def estimate(
             if settled.get(sample.id):
                 row.done += 1
                 continue
-            kind = _kind(sample.track.name, sample.variant)
             for outline in outlines if row.model.kind == "litellm" else ():
                 is_known = has_all_pictures(outline)
                 asked = replace(outline, seed=sample.seed, params=row.model.params)
                 key = reply_key(row.model, sample.as_sent(asked)) if is_known else ""
-                kept = cache.get(key) if cache is not None and is_known else None
-                if kept is not None:
+                if cache is not None and is_known and cache.get(key) is not None:
                     row.cached += 1
-                    row.add_reply(kept.usage.completion_tokens, kind)
                 elif key in waiting:
                     row.waiting += 1
                 else:
-                    row.add_call(estimate_call(row.model, asked), kind)
+                    row.add_call(estimate_call(row.model, asked))
     return list(rows.values())
 
 
@@ -177,8 +145,3 @@ def _samples(plan: RunPlan) -> Iterator[tuple[Sample, Sequence[Request]]]:
                     outlines = list(track.outlines(shown))
                 for variant, model in product(repeats, plan.models):
                     yield Sample(track, model.name, item, seed, variant), outlines
-
-
-def _kind(track: str, variant: Variant) -> str:
-    """Return a name for questions whose replies have similar lengths."""
-    return f"{track} {variant.shown.key}"

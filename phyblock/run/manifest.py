@@ -20,18 +20,17 @@ from phyblock.parsing.text import READER_VERSION
 from phyblock.records.files import FORMAT, Manifest
 from phyblock.sim.engine import ENGINES, described_engine
 from phyblock.text import hex_digest
-from phyblock.tracks.base import Track, kind_of, simulating
+from phyblock.tracks.base import Track, simulating
 
 _ENGINES = (engine.distribution for engine in ENGINES.values())
 _LIBRARIES = ("litellm", *_ENGINES, "numpy", "pillow", "jinja2")
 """Libraries whose versions a run records; one or both physics engines may be installed."""
 _LABELS = ("published", "served_at", "size_b", "pictures")
 _NOT_IDENTITY = {
-    *("dataset.root", "suite.name", "suite.description", "suite.limit", "suite.limits"),
+    *("dataset.root", "suite.name", "suite.description", "suite.limits"),
     *("suite.models", "suite.baselines", "suite.seeds", "suite.dataset"),
 }
 """Parts of a manifest that may change while the run stays the same, or that repeat others."""
-_LONGEST_SHOWN = 60
 _SENT = frozenset({"params", "sampling"})
 """Keys of values that are sent to a model unchanged, where `/no_think` is not a path."""
 _PATH = re.compile(
@@ -80,9 +79,8 @@ def make_manifest(
             libraries[name] = version(name)
     engine = {"engine": described_engine()} if simulating(suite.model_dump()) else {}
     questions: dict[str, Any] = {}
-    for name, root in suite.files.folders.items():
-        form = getattr(suite, kind_of(name).section).format
-        about = {"format": form, "root": str(root), "version": read_version(root)}
+    for root in suite.files.folders.values():
+        about = {"root": str(root), "version": read_version(root)}
         questions = questions or {"questions": about}
     fields = {
         "identity": identity,
@@ -139,36 +137,24 @@ def _model(model: ModelConfig) -> dict[str, object]:
 
 
 def differences(found: Manifest, wanted: Manifest) -> list[str]:
-    """Return the differences that make two manifests different runs, by dotted names."""
+    """Return what makes two manifests different runs, by dotted names with old and new values."""
     old, new = _parts(found), _parts(wanted)
+    is_same = found.identity == wanted.identity
     differ = [
-        (
-            f"{part}.{key}".lstrip("."),
-            json.dumps(old[part].get(key)),
-            json.dumps(new[part].get(key)),
-        )
-        for part in new.keys() & old.keys()
-        for key in old[part].keys() | new[part].keys()
+        f"{part}.{key} ({json.dumps(old[part].get(key))}, now {json.dumps(new[part].get(key))})"
+        for part in new
+        if part in old and (part.startswith("models.") or not is_same)
+        for key in {**old[part], **new[part]}
         if old[part].get(key) != new[part].get(key)
     ]
-    if found.identity == wanted.identity:
-        differ = [one for one in differ if one[0].startswith("models.")]
-    elif {"suite.levels", "limit"} & {name for name, *_ in differ}:
-        # Other scenes of the same data also have other digests.
-        differ = [one for one in differ if not one[0].endswith("sha256")]
-    names = sorted(
-        f"{name} ({was}, now {now})" if len(was + now) < _LONGEST_SHOWN else name
-        for name, was, now in differ
-    )
-    is_same = found.identity == wanted.identity
-    return names or ([] if is_same else ["how phyblock asks, draws or reads"])
+    return differ or ([] if is_same else ["how phyblock asks, draws or reads"])
 
 
 def _parts(manifest: Manifest) -> dict[str, dict[str, Any]]:
     """Return what determines a run's results, by part and name, without digests of pictures."""
     fields = manifest.fields()
-    models = {f"models.{one.name}": one.fields() for one in (*manifest.models, *manifest.others)}
-    parts = {"": {"limit": manifest.limit}, "suite": fields["suite"], **models}
+    parts = {"suite": {**fields["suite"], "limit": manifest.limit}}
+    parts |= {f"models.{one.name}": one.fields() for one in (*manifest.models, *manifest.others)}
     parts |= {"dataset": fields.get("dataset") or {}, **manifest.tracks}
     return {
         part: {

@@ -12,13 +12,13 @@ from pathlib import Path
 
 from phyblock.config.models import RECORDED, ModelConfig, resolve_models, with_members
 from phyblock.config.suite import Suite, Variant, load_suite
-from phyblock.config.yaml import read_yaml
+from phyblock.config.yaml import YamlSource
 from phyblock.data.base import Dataset
 from phyblock.data.lookup import open_dataset
 from phyblock.data.official import match_published, recorded_models
 from phyblock.errors import Problem, SpecError
 from phyblock.files import bundled
-from phyblock.models.keys import server_address
+from phyblock.models.keys import api_key_status, server_address
 from phyblock.models.model import takes_format
 from phyblock.models.request import Request
 from phyblock.records.files import MANIFEST, Manifest, read_manifest, suite_of
@@ -278,37 +278,44 @@ def to_config(name: str, known: ModelConfig, suite: Suite) -> ModelConfig:
     return config.model_copy(update={"response_format": "always" if sends else "never"})
 
 
-def model_problems(
-    path: Path, known: Mapping[str, ModelConfig], names: Iterable[str]
-) -> Iterator[Problem]:
-    """Yield the problems of these models and groups in a models file: missing recordings, unknown
-    providers.
+def check_models(models: Iterable[ModelConfig], source: YamlSource | None = None) -> None:
+    """Raise SpecError naming all models that cannot be asked: missing recordings, unknown
+    providers, and before a run, without the `source` of the models file, keys that are not set.
     """
-    source = read_yaml(path)
-    for name in (name for name in with_members(tuple(names), known) if name in known):
-        config = known[name]
+    problems: list[Problem] = []
+    for config in models:
+        name, where = config.name, f"model {config.name}"
+        if source is not None:
+            where = source.where((name, "replay" if config.replay is not None else "id"))
         if config.replay is not None and not os.path.isdir(config.replay):
-            where, message = source.where((name, "replay")), "recordings not found"
-            hint = "the path is taken relative to the models file"
-            yield Problem(where, message, f"{name}.replay", config.replay, "a folder", hint)
-        if (problem := provider_problem(config, source.where((name, "id")))) is not None:
-            yield problem
+            message, hint = "recordings not found", "the path is relative to the models file"
+            found, allowed = config.replay, "a folder"
+            problems.append(Problem(where, message, f"{name}.replay", found, allowed, hint))
+        if config.kind != "litellm":
+            continue
+        if not config.is_direct and config.provider not in (providers := _providers(config)):
+            message, hint = "has an unknown provider", did_you_mean(config.provider, providers)
+            if config.addresses:
+                hint = f"a server that speaks OpenAI's chat protocol: hosted_vllm/{config.id}"
+            allowed = "provider/model, as litellm names them"
+            problems.append(Problem(where, message, f"{name}.id", config.id, allowed, hint))
+            continue
+        status = api_key_status(config)
+        if source is None and status.fault:
+            problems.append(Problem(where, status.fault, "", config.id))
+        elif source is None and status.is_needed and not status.is_set:
+            variables = " or ".join(status.variables)
+            hint = f"set {variables} in the environment, or exclude the model with --models"
+            message = "needs an API key, and none is set"
+            problems.append(Problem(where, message, "", config.id, hint=hint))
+    if problems:
+        raise SpecError(problems)
 
 
-def provider_problem(config: ModelConfig, where: str) -> Problem | None:
-    """Return the problem that litellm does not know a model's provider, or None."""
-    if config.kind != "litellm" or config.is_direct:
-        return None
+def _providers(config: ModelConfig) -> frozenset[str]:
     from phyblock.models.litellm_client import known_providers
 
-    providers = known_providers(config)
-    if config.provider in providers:
-        return None
-    message, hint = "has an unknown provider", did_you_mean(config.provider, providers)
-    if config.addresses:
-        hint = f"a server of your own that speaks OpenAI's chat protocol: hosted_vllm/{config.id}"
-    allowed = "provider/model, as litellm names them"
-    return Problem(where, message, f"{config.name}.id", config.id, allowed, hint)
+    return known_providers(config)
 
 
 def bundled_suites() -> list[str]:
@@ -354,13 +361,3 @@ def find_models_file(named: str | None, suite: Path | None) -> Path:
 def prompt_dirs(suite: Path) -> list[Path]:
     """Folders of custom prompts, here and near the suite; a models file may be beside each."""
     return [folder / "prompts" for folder in (Path(), suite.parent, suite.parent.parent)]
-
-
-def prompt_remarks(suite: Suite, plan: RunPlan) -> list[str]:
-    """Return a sentence on each custom prompt that is sent."""
-    if all(model.kind != "litellm" for model in plan.models):
-        return []
-    suites = [suite.at(variant) for variant in plan.variants]
-    named = ((track, one.template(track)) for one in suites for track in one.tracks)
-    remarks = (f"prompt of {track}: {path}" for track, path in named if path is not None)
-    return list(dict.fromkeys(remarks))

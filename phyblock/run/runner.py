@@ -33,13 +33,12 @@ from phyblock.errors import (
 from phyblock.files import reply_cache_file
 from phyblock.models.cache import ReplyCache, reply_key
 from phyblock.models.costs import Budget
-from phyblock.models.keys import api_key_status
 from phyblock.models.model import ModelEvent, RetryPolicy, build_model
 from phyblock.models.request import HaltedError, Model, Request
 from phyblock.records.files import BATCHES
 from phyblock.records.record import Record, Reply
 from phyblock.run.judge import about_prompt, begun, judge_episode, judge_reply
-from phyblock.run.plan import RunPlan, Sample, provider_problem
+from phyblock.run.plan import RunPlan, Sample
 from phyblock.run.store import RunStore, Summary
 from phyblock.text import counted
 from phyblock.tracks.base import Item
@@ -130,24 +129,6 @@ class RunResult:
         self.settled += sample.is_final
         self.failed += sample.is_final and not sample.is_answered
         self.unjudged += not sample.is_judged
-
-
-def check_ready(plan: RunPlan) -> None:
-    """Raise SpecError naming every model whose key or address is not set."""
-    problems: list[Problem] = []
-    for config in plan.models:
-        where, status = f"model {config.name}", api_key_status(config)
-        if status.fault:
-            problems.append(Problem(where, status.fault, "", config.id))
-        if (unknown := provider_problem(config, where)) is not None:
-            problems.append(unknown)
-        elif status.is_needed and not status.is_set:
-            names = " or ".join(status.variables)
-            hint = f"set {names} in the environment, or exclude the model with --models"
-            message = "needs an API key, and none is set"
-            problems.append(Problem(where, message, "", config.id, hint=hint))
-    if problems:
-        raise SpecError(problems)
 
 
 @dataclass(eq=False)

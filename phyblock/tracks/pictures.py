@@ -21,8 +21,7 @@ from phyblock.files import (
     LARGEST_PICTURE_BYTES,
     atomic_write,
     cache_dir,
-    decode_picture,
-    picture_size,
+    open_picture,
     read_bytes,
     read_picture,
     writing,
@@ -153,7 +152,8 @@ class Workshop:
         return None
 
     def _remembered(self, drawing: Drawing, data: bytes) -> Image:
-        image = Image(data, drawing.label, *picture_size(data, f"picture {drawing.label}"))
+        with open_picture(data, f"picture {drawing.label}") as opened:
+            image = Image(data, drawing.label, *opened.size)
         with self._recent_lock:
             self._recent[drawing.key, drawing.label] = image
             if len(self._recent) > _KEPT:
@@ -238,7 +238,7 @@ def _joined(make_goal: Callable[[], bytes], make_grid: Callable[[], bytes]) -> b
 
 def _half(composite: Path, *, is_goal: bool) -> bytes:
     """Return goal or candidates cut out of a 2:1 composite: two squares, with a gap between."""
-    with decode_picture(read_picture(composite), str(composite)) as picture:
+    with open_picture(read_picture(composite), str(composite)) as picture:
         # PNG has no CMYK, which JPEG files may use.
         picture = picture.convert("RGB") if picture.mode == "CMYK" else picture
         width, height = picture.size

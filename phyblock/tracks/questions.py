@@ -23,8 +23,7 @@ from phyblock.config.validation import (
     TemplateName,
     UniqueSome,
 )
-from phyblock.data.base import Dataset, QuestionSet, QuestionTask
-from phyblock.data.official import read_official_questions
+from phyblock.data.base import Dataset, QuestionSet
 from phyblock.data.questions import QUESTIONS_FILE, read_questions
 from phyblock.domain.question import (
     CATEGORIES,
@@ -35,11 +34,10 @@ from phyblock.domain.question import (
     Subtask,
     is_picture_option,
     rotated,
-    rotated_label,
 )
 from phyblock.domain.scene import Scene
 from phyblock.errors import DataError, Problem, SpecError
-from phyblock.files import bundled, bundled_sets, read_picture
+from phyblock.files import bundled, bundled_sets
 from phyblock.models.request import Image
 from phyblock.parsing.answer import ParsedAnswer, choice_form, parse_answer
 from phyblock.parsing.text import AnswerForm
@@ -57,7 +55,7 @@ from phyblock.tracks.baselines import Guesses, majority_rule
 from phyblock.tracks.measures import OVERALL, WHOLE, Cell, SampleCounts
 from phyblock.tracks.picking import Choice, Picking
 from phyblock.tracks.pictures import Drawing, picture_style
-from phyblock.types import Background, DataFormat
+from phyblock.types import Background
 
 BUILTIN_QUESTIONS = "phyblock-vqa"
 """The question set of suites that name none."""
@@ -66,9 +64,6 @@ BUILTIN_QUESTIONS = "phyblock-vqa"
 class VqaSpec(PictureControls):
     """The questions of the vqa track and their presentation."""
 
-    format: DataFormat = "builtin"
-    """builtin: a folder with questions.jsonl. official: a folder with question files in the
-    official JSON form and their pictures."""
     path: Annotated[str, Field(min_length=1)] = BUILTIN_QUESTIONS
     """Name of a bundled question set (phyblock-vqa), or a folder, relative as in dataset.path. Its
     scenes are those of dataset."""
@@ -291,24 +286,24 @@ def pick_answer(subject: ChoiceSubject) -> Picking:
 class AskedQuestion:
     """A question with its options in one order; `rotation` 0 is that of the data set."""
 
-    task: QuestionTask
+    original: Question
     rotation: int = 0
     is_one_of_many: bool = False
 
     @functools.cached_property
     def question(self) -> Question:
         """The question as shown."""
-        return rotated(self.task.question, self.rotation)
+        return rotated(self.original, self.rotation)
 
     @property
     def key(self) -> str:
         """The question's id, with the rotation if all are asked."""
-        return f"{self.task.key}-r{self.rotation}" if self.is_one_of_many else self.task.key
+        return f"{self.original.id}-r{self.rotation}" if self.is_one_of_many else self.original.id
 
     @property
     def scene(self) -> Scene:
         """The scene as the question shows it."""
-        return self.task.scene
+        return self.original.scene
 
 
 def question_drawings(
@@ -317,17 +312,11 @@ def question_drawings(
     """Return the pictures of a question: scene, the block by itself if there is one, options.
 
     `background` overrides the backgrounds of questions; questions without one have the style's.
-    Raises DataError for a missing picture.
     """
     recipes = {recipe.label: recipe for recipe in item.question.pictures}
-    n, files = len(item.question.options), item.task.files
-    paths = {rotated_label(at, item.rotation, n): path for at, path in files.items()}
     drawings = {}
     for label in ("scene", "block", *LETTERS):
-        if label in paths:
-            read = partial(read_picture, paths[label])
-            drawings[label] = Drawing(label, hex_digest(read()), read, is_file=True)
-        elif label in recipes:
+        if label in recipes:
             recipe = recipes[label]
             recipe = replace(recipe, background=background or recipe.background)
             key, make = question_key(recipe, style), partial(question_png, recipe, style)
@@ -342,11 +331,11 @@ def question_items(
     recorded = manifest.questions
     if recorded is None:
         raise DataError(Problem(str(folder / MANIFEST), "names no questions", "questions"))
-    questions = open_questions(recorded.format, Path(recorded.root), dataset)
+    questions = open_questions(Path(recorded.root), dataset)
     if questions.sha256 != manifest.tracks.get("vqa", {}).get("questions"):
         message = "is not the data set that the run was made on, or it was changed since"
         raise DataError(Problem(str(questions.root), message, "sha256", questions.sha256))
-    by_id = {task.question.id: task for task in questions.tasks}
+    by_id = {question.id: question for question in questions.questions}
 
     def asked(record: Record) -> AskedQuestion | None:
         if not isinstance(record, ChoiceRecord) or record.question.id not in by_id:
@@ -381,17 +370,15 @@ class Vqa(Track):
     def open(self) -> None:
         """Select questions. Raises SpecError if there are none."""
         suite, spec = self.suite, self.spec
-        self.questions = known = open_questions(
-            spec.format, suite.files.folders[self.name], self.dataset
-        )
-        asked = known.tasks
+        self.questions = known = open_questions(suite.files.folders[self.name], self.dataset)
+        asked = known.questions
         if suite.dataset.difficulty.ranges:
             fitting = {one.key for one in select_tasks(self.dataset.tasks, suite, None)}
-            asked = tuple(one for one in known.tasks if one.scene.id in fitting)
+            asked = tuple(one for one in known.questions if one.scene.id in fitting)
         tasks = select_questions(asked, spec.subtasks, suite.levels, spec.per_subtask, self.limit)
         if not tasks:
             where = suite.where("vqa", "subtasks")
-            found = ", ".join(sorted({task.question.subtask for task in known.tasks}))
+            found = ", ".join(sorted({question.subtask for question in known.questions}))
             message = "no question is of these subtasks, levels and difficulty"
             raise SpecError(Problem(where, message, "vqa.subtasks", found=f"questions of {found}"))
         self.items = tuple(
@@ -399,7 +386,7 @@ class Vqa(Track):
             for task in tasks
             for rotation in range(spec.rotations)
         )
-        self._guesses = Guesses([task.question for task in known.tasks], majority_rule)
+        self._guesses = Guesses(known.questions, majority_rule)
 
     def draw(self, item: AskedQuestion) -> tuple[Drawing, ...]:
         """Return the pictures of a question in the style of the suite."""
@@ -460,10 +447,8 @@ class Vqa(Track):
         return Judgement(parsed.rule is not None, fields)
 
 
-def open_questions(format_name: str, path: Path, dataset: Dataset) -> QuestionSet:
+def open_questions(path: Path, dataset: Dataset) -> QuestionSet:
     """Read a question set about the scenes of a data set. Raises DataError if it is missing."""
-    if format_name == "official":
-        return read_official_questions(path, dataset)
     if (path / QUESTIONS_FILE).is_file():
         return read_questions(path, dataset)
     names = ", ".join(bundled_sets(QUESTIONS_FILE))
@@ -472,31 +457,31 @@ def open_questions(format_name: str, path: Path, dataset: Dataset) -> QuestionSe
 
 
 def select_questions(
-    tasks: Sequence[QuestionTask],
+    questions: Sequence[Question],
     subtasks: Sequence[Subtask],
     levels: Sequence[int],
     per_subtask: int | None,
     limit: int | None,
-) -> tuple[QuestionTask, ...]:
+) -> tuple[Question, ...]:
     """Return the questions of these subtasks about scenes of these levels, in the set's order.
 
     At most `per_subtask` of each subtask are kept, and `limit` in all, shared over the subtasks.
     The kept questions are spread evenly over the set, and a higher limit keeps them.
     """
-    groups: dict[str, list[QuestionTask]] = {name: [] for name in SUBTASKS if name in subtasks}
-    for task in tasks:
-        if task.question.subtask in groups and set(task.scene.levels) & set(levels):
-            groups[task.question.subtask].append(task)
+    groups: dict[str, list[Question]] = {name: [] for name in SUBTASKS if name in subtasks}
+    for question in questions:
+        if question.subtask in groups and set(question.scene.levels) & set(levels):
+            groups[question.subtask].append(question)
     found = [group for group in groups.values() if group]
     shares = [min(per_subtask or len(group), len(group)) for group in found]
     if limit is not None:
         shares = stratified(shares, limit)
     kept = {
-        group[place].key
+        group[place].id
         for group, share in zip(found, shares, strict=True)
         for place in spread(len(group))[:share]
     }
-    return tuple(task for task in tasks if task.key in kept)
+    return tuple(question for question in questions if question.id in kept)
 
 
 TRACK = Vqa

@@ -96,15 +96,17 @@ def is_option(verb, *words):
 
 
 def test_a_call_that_may_cost_is_made_only_where_somebody_agrees(workspace):
+    workspace.write_suite(models=["dear", "free"], seeds=[0], levels=[3])
+    words = ("run", "suite.yaml", "--limit", "1", "--out", "out", "--models")
     with Running(OpenAIChat()) as running:
         workspace.write_models(running.url, "dear", price={"input": 1.0, "output": 1.0})
-        refused = workspace.phyblock("models", "check", "dear", env={"CI": "1"})
+        refused = workspace.phyblock(*words, "dear", env={"CI": "1"})
         assert (refused.code, running.server.requests) == (2, 0)
         assert "would cost money, and there is no terminal to ask on" in refused.err
-        workspace.does("models", "check", "dear", "--yes")
+        workspace.does(*words, "dear", "--yes")
         assert running.server.requests == 1
         workspace.write_models(running.url, "free", price={"input": 0.0, "output": 0.0})
-        workspace.does("models", "check", "free")
+        workspace.does(*words, "free")
         assert running.server.requests == 2
 
 

@@ -141,7 +141,7 @@ def test_a_limit_keeps_some_of_every_level_and_is_a_run_of_its_own(copy):
     assert {level for r in records for level in r["levels"]} == {1, 2, 3, 4}
     other = copy.run("--limit", "4", "--models", "oracle")
     assert other.code == 2
-    assert "found: different: limit" in other.err
+    assert "found: different: suite.limit (3, now 4)" in other.err
 
 
 def test_only_what_may_change_a_reply_makes_another_run(copy):

@@ -123,7 +123,6 @@ def test_keys_and_pictures_stay_off_the_disk(workspace, transport):
         workspace.write_suite(models=list(entries), seeds=[0, 1], limits=limits)
         told = [workspace.run("--yes", env=KEYS, fresh=True), workspace.run("--dry-run", env=KEYS)]
         told.append(workspace.phyblock("models", env=KEYS))
-        told += [workspace.phyblock("models", "check", n, env=KEYS) for n in ("talks", "locked")]
     used = {seen.key for server in servers.values() for seen in server.seen}
     names = ("HOSTED_VLLM_API_KEY", "MY_SERVER_KEY", "MY_SHORT_KEY", "OPENAI_API_KEY")
     assert used == {KEYS[name] for name in names}
@@ -136,14 +135,3 @@ def test_keys_and_pictures_stay_off_the_disk(workspace, transport):
         assert b"5ecret" not in content, name
         assert PNG_HEAD not in content, name
         assert b"IHDR" not in content, name
-
-
-def test_a_check_asks_every_server(workspace):
-    with Running(OpenAIChat()) as server:
-        bases = [f"{server.url}/v1", "http://127.0.0.1:9/v1"]
-        workspace.write_yaml("models.yaml", {"m": {"id": "hosted_vllm/m", "api_base": bases}})
-        models_file = workspace.root / "models.yaml"
-        checked = workspace.phyblock("models", "--models-file", models_file, "check", "m")
-    assert checked.code == 1
-    assert f"m at 127.0.0.1:{server.port} answers: " in checked.out
-    assert "m at 127.0.0.1:9 failed the check: " in checked.out
