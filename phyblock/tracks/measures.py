@@ -19,7 +19,6 @@ from phyblock.scoring.plan import mean_of, ratio_of
 
 if TYPE_CHECKING:
     from phyblock.config.suite import Suite
-    from phyblock.data.base import Dataset
     from phyblock.records.files import Manifest
     from phyblock.records.record import Record
     from phyblock.scoring.plan import Metric
@@ -219,9 +218,7 @@ class TrackReport:
     `short` the column of `Run.summary`, `success` the measure that is 1 if a sample is wholly
     right.
 
-    `part_names` explain `Record.part`. `items`, for tracks about more than scenes, opens the items
-    of a run in a folder for its page, and returns the item of a record, with its `question` as
-    shown; it raises DataError for other data than the run's.
+    `part_names` explain `Record.part`.
     """
 
     measures: tuple[Measure, ...]
@@ -233,7 +230,6 @@ class TrackReport:
     short: str = ""
     success: str = ""
     part_names: Mapping[str, str] = field(default_factory=dict)
-    items: Callable[[Path, Manifest, Dataset], Callable[[Record], Any | None]] | None = None
 
     def heading(self, name: str) -> str:
         """Return the heading of the measure that counts an error or ending, or its name as words.

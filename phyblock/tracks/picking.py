@@ -86,25 +86,20 @@ class Picking:
         Raises ValueError for too few or too many, unknown places, repeats that are not allowed,
         and numbers that are missing or not allowed.
         """
-        places, n_fields = [pick.place for pick in picks], len(self.fields)
-        if (
-            not self.least <= len(picks) <= self.most
-            or not all(0 <= place < len(self.choices) for place in places)
-            or (not self.repeats and len(set(places)) < len(places))
-            or any(len(pick.numbers) != n_fields for pick in picks)
-            or not all(
+        places = [pick.place for pick in picks]
+        is_answer = (
+            self.least <= len(picks) <= self.most
+            and all(0 <= place < len(self.choices) for place in places)
+            and (self.repeats or len(set(places)) == len(places))
+            and all(len(pick.numbers) == len(self.fields) for pick in picks)
+            and all(
                 field.allows(value)
                 for pick in picks
                 for field, value in zip(self.fields, pick.numbers, strict=True)
             )
-        ):
-            rules = [f"{self.least} to {self.most} picks of 0 to {len(self.choices) - 1}"]
-            rules += [] if self.repeats else ["none twice"]
-            rules += [
-                f"{one.name} within ±{one.most:g} {one.unit} with at most {one.decimals} decimals"
-                for one in self.fields
-            ]
-            raise ValueError(f"holds picks that make no answer: it needs {', '.join(rules)}")
+        )
+        if not is_answer:
+            raise ValueError("holds picks that make no answer")
         return self.write(picks)
 
 

@@ -12,7 +12,7 @@ from concurrent.futures import Executor
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, Self, TypeVar
 
 from phyblock.config.suite import ImagesSpec
 from phyblock.domain.scene import AssemblyTask
@@ -61,6 +61,14 @@ class Drawing:
     make: Callable[[], bytes]
     size_px: tuple[int, int] = (0, 0)
     is_file: bool = False
+
+    @classmethod
+    def of(
+        cls, label: str, key: Callable[..., str], make: Callable[..., bytes], *what: Any
+    ) -> Self:
+        """Return the drawing of `what`, which ends in the style of a square picture."""
+        side_px = what[-1].size_px
+        return cls(label, key(*what), partial(make, *what), (side_px, side_px))
 
 
 class Workshop:
@@ -204,27 +212,7 @@ def scene_drawings(task: AssemblyTask, images: ImagesSpec) -> tuple[Drawing, ...
     They are drawn, or cut out of the data set's own composites. A goal that is not shown does not
     affect the size. Raises DataError if the data set lacks a picture that it must provide.
     """
-    if images.source == "dataset":
-        if (path := task.composite) is None:
-            message = "the data set has no picture of it"
-            hint = "render the pictures: --set images.source=render"
-            raise DataError(Problem(f"scene {task.scene.id}", message, hint=hint))
-        key, whole = hex_digest(read_picture(path)), partial(read_picture, path)
-        goal, grid = (
-            Drawing(label, key, partial(_half, path, is_goal=label == "goal"), is_file=True)
-            for label in ("goal", "candidates")
-        )
-        both = Drawing("composite", key, whole, is_file=True)
-    else:
-        style = picture_style(images)
-        style = style if task.is_blind else goal_style(task.scene, style)
-        side, key = (style.size_px, style.size_px), goal_key(task.scene, style)
-        goal = Drawing("goal", key, partial(goal_png, task.scene, style), side)
-        key, make = candidates_key(task.candidates, style), partial(candidates_png, task.candidates)
-        grid = Drawing("candidates", key, partial(make, style), side)
-        key = hex_digest(f"composite {goal.key} {grid.key}")
-        join = partial(_joined, goal.make, grid.make)
-        both = Drawing("composite", key, join, joined_size_px(style.size_px))
+    goal, grid, both = _own(task) if images.source == "dataset" else _drawn(task, images)
     if task.is_blind:
         return (grid,)
     if images.layout == "composite":
@@ -232,11 +220,33 @@ def scene_drawings(task: AssemblyTask, images: ImagesSpec) -> tuple[Drawing, ...
     return (goal, grid) if images.order[0] == "goal" else (grid, goal)
 
 
-def _joined(make_goal: Callable[[], bytes], make_grid: Callable[[], bytes]) -> bytes:
-    return composite_png(make_goal(), make_grid())
+def _drawn(task: AssemblyTask, images: ImagesSpec) -> tuple[Drawing, Drawing, Drawing]:
+    style = picture_style(images)
+    style = style if task.is_blind else goal_style(task.scene, style)
+    goal = Drawing.of("goal", goal_key, goal_png, task.scene, style)
+    grid = Drawing.of("candidates", candidates_key, candidates_png, task.candidates, style)
+    key, join = hex_digest(f"composite {goal.key} {grid.key}"), partial(_joined, goal, grid)
+    return goal, grid, Drawing("composite", key, join, joined_size_px(style.size_px))
 
 
-def _half(composite: Path, *, is_goal: bool) -> bytes:
+def _joined(goal: Drawing, grid: Drawing) -> bytes:
+    return composite_png(goal.make(), grid.make())
+
+
+def _own(task: AssemblyTask) -> tuple[Drawing, Drawing, Drawing]:
+    if (path := task.composite) is None:
+        message, hint = "the data set has no picture of it", "use images.source: render"
+        raise DataError(Problem(f"scene {task.key}", message, "images.source", hint=hint))
+    key = hex_digest(read_picture(path))
+    makes = partial(_half, path, is_goal=True), partial(_half, path), partial(read_picture, path)
+    labels = ("goal", "candidates", "composite")
+    goal, grid, both = (
+        Drawing(label, key, make, is_file=True) for label, make in zip(labels, makes, strict=True)
+    )
+    return goal, grid, both
+
+
+def _half(composite: Path, *, is_goal: bool = False) -> bytes:
     """Return goal or candidates cut out of a 2:1 composite: two squares, with a gap between."""
     with open_picture(read_picture(composite), str(composite)) as picture:
         # PNG has no CMYK, which JPEG files may use.

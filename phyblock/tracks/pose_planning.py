@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import math
 import threading
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -137,10 +136,6 @@ class StepOutcome(Line):
     """The ending."""
     moved_cm: Amount = 0.0
     """Distance from the place of the block to its place at rest [cm]."""
-    turned_deg: Amount = 0.0
-    """Angle by which it turned before it came to rest [degrees]."""
-    gap_cm: Amount = 0.0
-    """Height above its support when it was released [cm]."""
     overlap_cm: Amount = 0.0
     """Distance by which it was moved out of others, or depth at which it was refused [cm]."""
     knocked: tuple[Whole, ...] = ()
@@ -156,10 +151,6 @@ class PoseOutcome(Line):
 
     right: dict[str, tuple[Whole, ...]]
     """By frame, `absolute` or `aligned`: right steps within 0.5, 1, 2 and 4 cm."""
-    shift_cm: tuple[Amount, Amount]
-    """The shift that aligns it, after the turn [cm]."""
-    turn_deg: Amount
-    """The turn about the vertical that aligns it [degrees]."""
     steps: tuple[StepOutcome, ...]
     """Outcome of each step."""
     reached: Whole
@@ -209,7 +200,7 @@ class PoseRecord(Record):
         return tuple(world.values())
 
 
-_END = ("end", "moved_cm", "turned_deg", "gap_cm", "overlap_cm", "knocked", "rests")
+_END = ("end", "moved_cm", "overlap_cm", "knocked")
 _WHOLE = ("reached", "iou", "completed", "engine")
 
 
@@ -243,7 +234,6 @@ def judge_poses(
     plan = [number for number in numbers if 1 <= number <= n]
     plan_scorer = AssemblyScorer(item.scene, item.candidates, settings)
     scores = plan_scorer.score(Plan(tuple(plan)), matchers, None)
-    motion = poses[-1].motion
     parse = {
         "parser": "poses",
         "rule": parsed.rule,
@@ -256,8 +246,6 @@ def judge_poses(
     }
     pose = {
         "right": {score.frame: list(score.right) for score in poses},
-        "shift_cm": [round(part, _DIGITS) + 0.0 for part in motion.shift_cm],
-        "turn_deg": round(math.degrees(motion.turn_rad), _DIGITS) + 0.0,
         "steps": [
             {**({"vertex": None} if fit is None else asdict(fit)), **end, "error": error}
             for fit, end, error in zip(fits, ended, errors, strict=True)
@@ -281,7 +269,8 @@ def _ended_before(record: PoseRecord | None, given: Sequence[PoseStep]) -> Ended
     known = [PoseStep(s.block, s.center_cm) for s in record.parse.steps]
     if known != list(given) or len(pose.steps) != len(known) or pose.limits != _LIMITS:
         return None
-    steps = tuple({n: v for n, v in step.fields().items() if n in _END} for step in pose.steps)
+    names = (*_END, "rests")
+    steps = tuple({n: v for n, v in step.fields().items() if n in names} for step in pose.steps)
     return steps, {name: getattr(pose, name) for name in _WHOLE}
 
 
@@ -303,7 +292,7 @@ def _carried(scene: Scene, blocks: Sequence[Block | None]) -> Ended:
                 rests.append(
                     {"step": block.order, "center_cm": place, "euler_deg": block.euler_deg}
                 )
-        steps.append({**asdict(step), "rests": rests})
+        steps.append({**{name: getattr(step, name) for name in _END}, "rests": rests})
     return steps, {
         "reached": reached,
         "iou": round(voxel_iou(goal, done.blocks), _DIGITS),
@@ -514,14 +503,11 @@ class PosePlanning(SceneTrack):
             for view in self.spec.views
         }
         drawings = []
-        if not item.is_blind:
-            for name, view_style in seen.items():
-                style = written_style(goal_style(item.scene, view_style))
-                key, make = ruled_key(item.scene, style), partial(ruled_png, item.scene, style)
-                drawings.append(Drawing(f"goal, {name}", key, make, (style.size_px, style.size_px)))
+        for name, view_style in () if item.is_blind else seen.items():
+            style = written_style(goal_style(item.scene, view_style))
+            drawings.append(Drawing.of(f"goal, {name}", ruled_key, ruled_png, item.scene, style))
         style = written_style(seen[self.spec.views[0]])
-        key, make = kit_key(item.candidates, style), partial(kit_png, item.candidates, style)
-        return (*drawings, Drawing(KIT_LABEL, key, make, (style.size_px, style.size_px)))
+        return (*drawings, Drawing.of(KIT_LABEL, kit_key, kit_png, item.candidates, style))
 
     def identity(self) -> dict[str, Any]:
         """Return what determines its results, with the version of plan execution."""

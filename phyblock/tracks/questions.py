@@ -41,17 +41,13 @@ from phyblock.files import bundled, bundled_sets
 from phyblock.models.request import Image
 from phyblock.parsing.answer import ParsedAnswer, choice_form, parse_answer
 from phyblock.parsing.text import AnswerForm
-from phyblock.records.files import MANIFEST, Manifest
+from phyblock.records.files import Manifest
 from phyblock.records.record import Line, Record, Whole
 from phyblock.scoring.plan import chance
 from phyblock.sim.pictures import PictureStyle
-from phyblock.sim.question_pictures import (
-    question_key,
-    question_png,
-)
+from phyblock.sim.question_pictures import question_key, question_png
 from phyblock.text import hex_digest
 from phyblock.tracks.base import Judgement, Track, select_tasks, spread, stratified
-from phyblock.tracks.baselines import Guesses, majority_rule
 from phyblock.tracks.measures import OVERALL, WHOLE, Cell, SampleCounts
 from phyblock.tracks.picking import Choice, Picking
 from phyblock.tracks.pictures import Drawing, picture_style
@@ -243,6 +239,84 @@ class ChoiceSubject:
     guess: Callable[[], tuple[int, ...]] = field(compare=False)
 
 
+Rule = Callable[[Question], tuple[int, ...]]
+"""A guess at `Question.answer`: the indices of options."""
+FOLDS = 5
+"""Number of folds: each is answered by rules learned from the others."""
+
+
+class Folds:
+    """Questions dealt into five folds in turn, by their first base scene.
+
+    Those of a fold are answered by rules learned from questions that share no base scene with it.
+    If answers are balanced over the whole set, such a rule scores below chance: an option that is
+    right more often in the known questions is right less often in the others. Only a score above
+    chance indicates a shortcut.
+    """
+
+    def __init__(self, questions: Sequence[Question]) -> None:
+        self._questions = questions
+        bases = sorted({_bases(question)[0] for question in questions})
+        self._fold = {base: place % FOLDS for place, base in enumerate(bases)}
+
+    def of(self, question: Question) -> int:
+        """Return the fold of a question. Raises KeyError if its base scene was not dealt."""
+        return self._fold[_bases(question)[0]]
+
+    def is_known(self, fold: int, question: Question) -> bool:
+        """True if a question shares no base scene with the questions of a fold."""
+        return all(self._fold.get(base) != fold for base in _bases(question))
+
+    def known(self, fold: int, subtask: Subtask) -> list[Question]:
+        """Return the questions of a subtask that share no base scene with a fold."""
+        mine = (question for question in self._questions if question.subtask == subtask)
+        return [question for question in mine if self.is_known(fold, question)]
+
+
+class Guesses:
+    """Guesses at questions of a set, or at rotations of them, by rules that `learn` returns."""
+
+    def __init__(
+        self, questions: Sequence[Question], learn: Callable[[Sequence[Question]], Rule]
+    ) -> None:
+        self._folds, self._learn = Folds(questions), learn
+        self._rules: dict[tuple[Subtask, int], Rule] = {}
+
+    def guess(self, question: Question) -> tuple[int, ...]:
+        """Return the guess of the rule that was learned from questions about other scenes."""
+        name = (question.subtask, self._folds.of(question))
+        if name not in self._rules:
+            self._rules[name] = self._learn(self._folds.known(name[1], question.subtask))
+        return self._rules[name](question)
+
+
+def majority_rule(known: Sequence[Question]) -> Rule:
+    """Learn to pick the option whose text is most often right when it is offered.
+
+    An unseen text counts as right one time in four. For options that are pictures or lettered
+    places, the letter counts instead of the text; for orders, the most frequent one is picked.
+    """
+    letters = Counter(question.answer for question in known)
+    right = Counter(question.options[question.answer[0]] for question in known)
+    shown = Counter(option for question in known for option in question.options)
+
+    def guess(question: Question) -> tuple[int, ...]:
+        options, is_ordering = list(question.options), question.subtask == "OR"
+        places = [f"place {letter}" for letter in "ABCD"[: len(options)]]
+        if is_ordering or all(map(is_picture_option, options)) or options == places:
+            first = tuple(range(len(options))) if is_ordering else (0,)
+            return min(letters, key=lambda answer: (-letters[answer], answer), default=first)
+        rates = [(right[option] + 1) / (shown[option] + 4) for option in options]
+        ties = [index for index, rate in enumerate(rates) if rate == max(rates)]
+        return (max(ties, key=lambda index: (letters[(index,)], -index)),)
+
+    return guess
+
+
+def _bases(question: Question) -> tuple[str, ...]:
+    return question.scene.parents or (question.scene.id,)
+
+
 def _random_choice(subject: ChoiceSubject, rng: np.random.Generator) -> str:
     n = len(subject.question.options)
     if subject.question.subtask == "OR":
@@ -319,30 +393,8 @@ def question_drawings(
         if label in recipes:
             recipe = recipes[label]
             recipe = replace(recipe, background=background or recipe.background)
-            key, make = question_key(recipe, style), partial(question_png, recipe, style)
-            drawings[label] = Drawing(label, key, make, (style.size_px, style.size_px))
+            drawings[label] = Drawing.of(label, question_key, question_png, recipe, style)
     return tuple(drawings.values())
-
-
-def question_items(
-    folder: Path, manifest: Manifest, dataset: Dataset
-) -> Callable[[Record], AskedQuestion | None]:
-    """Return the questions of a run. Raises DataError if they are not the ones it was made on."""
-    recorded = manifest.questions
-    if recorded is None:
-        raise DataError(Problem(str(folder / MANIFEST), "names no questions", "questions"))
-    questions = open_questions(Path(recorded.root), dataset)
-    if questions.sha256 != manifest.tracks.get("vqa", {}).get("questions"):
-        message = "is not the data set that the run was made on, or it was changed since"
-        raise DataError(Problem(str(questions.root), message, "sha256", questions.sha256))
-    by_id = {question.id: question for question in questions.questions}
-
-    def asked(record: Record) -> AskedQuestion | None:
-        if not isinstance(record, ChoiceRecord) or record.question.id not in by_id:
-            return None
-        return AskedQuestion(by_id[record.question.id], record.question.rotation)
-
-    return asked
 
 
 class Vqa(Track):
@@ -363,7 +415,6 @@ class Vqa(Track):
         "code": {"accuracy": {"chance": _guessing}},
         "cells": _run_cells,
         "part_names": {str(short): name for short, name in SUBTASK_NAMES.items()},
-        "items": question_items,
     }
     spec: VqaSpec
 

@@ -409,17 +409,15 @@ class StepPlanning(SceneTrack):
         """Return the orders of blocks that fall when all are released at their goal poses."""
         if blocks not in self._fallen:
             trial = DEFAULT_TRIAL if self.spec.physics == "strict" else ONE_SETTING
-            self._fallen[blocks] = (
-                await self.work_out(functools.partial(settle, blocks, trial))
-            ).fallen
+            settled = await self.work_out(functools.partial(settle, blocks, trial))
+            self._fallen[blocks] = settled.fallen
         return self._fallen[blocks]
 
     def draw_state(self, item: AssemblyTask, blocks: Sequence[Block]) -> Drawing:
         """Return the picture of blocks from the goal's camera."""
         style = goal_style(item.scene, picture_style(self.suite.images))
         recipe = state_picture(item.scene, blocks, style)
-        key, make = question_key(recipe, style), functools.partial(question_png, recipe, style)
-        return Drawing(recipe.label, key, make, (style.size_px, style.size_px))
+        return Drawing.of(recipe.label, question_key, question_png, recipe, style)
 
 
 class StepEpisode:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -16,7 +16,6 @@ import pandas as pd
 from phyblock.domain.scene import AssemblyTask
 from phyblock.errors import DataError
 from phyblock.records.files import ManifestModel, read_stopped
-from phyblock.records.record import Record
 from phyblock.results.compare import Side, comparable, rank_ranges_of
 from phyblock.results.estimates import (
     Headline,
@@ -29,7 +28,7 @@ from phyblock.results.load import Run, track_measures
 from phyblock.results.tables import coverage_frame
 from phyblock.results.text import number as rounded
 from phyblock.run.manifest import portable_manifest
-from phyblock.run.rescore import recorded_dataset
+from phyblock.run.rescore import recorded_dataset, reopen_tracks
 from phyblock.text import counted
 from phyblock.tracks.base import kind_of
 from phyblock.types import WITHOUT_REPLY
@@ -41,12 +40,12 @@ _MOST_CHARACTERS = 160
 
 @dataclass(frozen=True)
 class Sources:
-    """Tasks by scene id, and items that are more than scenes by track; if there are none, `lacking`
-    is the reason.
+    """Tasks by scene id, and items that are more than scenes by track and name; if there are none,
+    `lacking` is the reason.
     """
 
     tasks: Mapping[str, AssemblyTask] = field(default_factory=dict)
-    items: Mapping[str, Callable[[Record], Any]] = field(default_factory=dict)
+    items: Mapping[tuple[str, str], Any] = field(default_factory=dict)
     lacking: str = ""
 
 
@@ -58,9 +57,9 @@ def open_sources(run: Run, data: Path | None) -> Sources:
     """
     try:
         dataset = recorded_dataset(run.path, run.manifest, data)
-        openers = {name: kind_of(name).report().items for name in run.design.suite.tracks}
-        facts = (run.path, run.manifest, dataset)
-        items = {name: opener(*facts) for name, opener in openers.items() if opener}
+        tracks = reopen_tracks(run.path, run.manifest, run.design.suite, dataset)
+        own = (track for track in tracks if track.has_own_data())
+        items = {(track.name, item.key): item for track in own for item in track.items}
         return Sources({task.scene.id: task for task in dataset.tasks}, items)
     except DataError as error:
         if data is not None:

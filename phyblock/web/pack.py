@@ -177,7 +177,7 @@ def pack_samples(
         for record in RecordLines(one.run.path).at(held["start"].tolist()):
             track, item = record.track, record.item
             if (track, item) not in numbered:
-                asked = opener(record) if (opener := one.sources.items.get(track)) else None
+                asked = one.sources.items.get((track, item))
                 question = -1
                 if asked:
                     fields = {name: _plain(getattr(asked.question, name)) for name in _OF_QUESTION}

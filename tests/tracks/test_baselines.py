@@ -17,7 +17,6 @@ from phyblock.parsing.plan import parse_plan
 from phyblock.parsing.poses import parse_poses
 from phyblock.scoring.plan import Goal
 from phyblock.sim.pictures import joined_size_px
-from phyblock.tracks.baselines import FOLDS, Folds, Guesses, majority_rule
 from phyblock.tracks.full_planning import PlanSubject, pick_plan
 from phyblock.tracks.goal_blind import (
     AREA_KEYS,
@@ -30,7 +29,14 @@ from phyblock.tracks.goal_blind import (
 )
 from phyblock.tracks.picking import Choice, Pick, Picking
 from phyblock.tracks.pose_planning import pick_poses
-from phyblock.tracks.questions import ChoiceSubject, pick_answer
+from phyblock.tracks.questions import (
+    FOLDS,
+    ChoiceSubject,
+    Folds,
+    Guesses,
+    majority_rule,
+    pick_answer,
+)
 from phyblock.tracks.step_planning import StepSubject, pick_step
 from tests.scoring.cases import plans_f1
 from tests.shipped import TASKS
@@ -271,7 +277,7 @@ NOT_NUMBERS = ((), (1, 2), (1, 2, 3, 0, 0, 0), (1, -1000.5, 3), (0.125, 2, 3), (
 @pytest.mark.parametrize("numbers", [*NOT_NUMBERS, (1, 2, float("nan")), (1, 2, float("inf"))])
 def test_numbers_that_are_lacking_or_not_allowed_are_refused(numbers):
     picking = pick_poses(PlanSubject(TASK.scene, TASK.candidates))
-    with pytest.raises(ValueError, match=r"y within ±1000 cm with at most 2 decimals"):
+    with pytest.raises(ValueError, match="make no answer"):
         picking.reply([Pick(0, numbers)])
 
 

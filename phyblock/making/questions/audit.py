@@ -23,7 +23,7 @@ from phyblock.making.questions.base import Floats
 from phyblock.making.questions.measures import measures_of
 from phyblock.making.questions.production import BALANCE
 from phyblock.making.questions.text_probe import text_rule
-from phyblock.tracks.baselines import FOLDS, Folds, Guesses, majority_rule
+from phyblock.tracks.questions import FOLDS, Folds, Guesses, majority_rule
 
 GUESSABLE = 0.35
 """Accuracy that no probe of a sound set exceeds, unless chance is within its interval."""

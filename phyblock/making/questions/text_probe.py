@@ -10,7 +10,7 @@ from typing import Any
 from phyblock.domain.question import Question
 from phyblock.errors import Problem, SpecError
 from phyblock.text import plain_sum
-from phyblock.tracks.baselines import Rule, majority_rule
+from phyblock.tracks.questions import Rule, majority_rule
 
 _SEED, _STRENGTH, _CROSSED = 0, 0.05, 0.25
 _WORD = re.compile(r"[a-z]+|\d+(?:\.\d+)?")
