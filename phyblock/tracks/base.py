@@ -380,16 +380,11 @@ class SceneTrack(Track):
 def select_tasks(
     tasks: Sequence[AssemblyTask], suite: Suite, limit: int | None
 ) -> tuple[AssemblyTask, ...]:
-    """Return the tasks of a suite's levels and difficulty, at most `limit`, in their order.
+    """Return the tasks of a suite's levels, at most `limit`, in their order.
 
     They are evenly spread, and a higher limit keeps all tasks of a lower one.
     """
-    levels, difficulty = set(suite.levels), suite.dataset.difficulty
-    chosen = [task for task in tasks if levels & set(task.scene.levels)]
-    if difficulty.ranges:
-        from phyblock.tracks.difficulty import is_within  # Few suites need it.
-
-        chosen = [task for task in chosen if is_within(task, difficulty)]
+    chosen = [task for task in tasks if set(suite.levels) & set(task.scene.levels)]
     kept = set(_fair_order([task.scene.level for task in chosen])[:limit])
     return tuple(task for position, task in enumerate(chosen) if position in kept)
 

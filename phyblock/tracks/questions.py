@@ -47,7 +47,7 @@ from phyblock.scoring.plan import chance
 from phyblock.sim.pictures import PictureStyle
 from phyblock.sim.question_pictures import question_key, question_png
 from phyblock.text import hex_digest
-from phyblock.tracks.base import Judgement, Track, select_tasks, spread, stratified
+from phyblock.tracks.base import Judgement, Track, spread, stratified
 from phyblock.tracks.measures import OVERALL, WHOLE, Cell, SampleCounts
 from phyblock.tracks.picking import Choice, Picking
 from phyblock.tracks.pictures import Drawing, picture_style
@@ -422,15 +422,13 @@ class Vqa(Track):
         """Select questions. Raises SpecError if there are none."""
         suite, spec = self.suite, self.spec
         self.questions = known = open_questions(suite.files.folders[self.name], self.dataset)
-        asked = known.questions
-        if suite.dataset.difficulty.ranges:
-            fitting = {one.key for one in select_tasks(self.dataset.tasks, suite, None)}
-            asked = tuple(one for one in known.questions if one.scene.id in fitting)
-        tasks = select_questions(asked, spec.subtasks, suite.levels, spec.per_subtask, self.limit)
+        tasks = select_questions(
+            known.questions, spec.subtasks, suite.levels, spec.per_subtask, self.limit
+        )
         if not tasks:
             where = suite.where("vqa", "subtasks")
             found = ", ".join(sorted({question.subtask for question in known.questions}))
-            message = "no question is of these subtasks, levels and difficulty"
+            message = "no question is of these subtasks and levels"
             raise SpecError(Problem(where, message, "vqa.subtasks", found=f"questions of {found}"))
         self.items = tuple(
             AskedQuestion(task, rotation, is_one_of_many=spec.circular)
