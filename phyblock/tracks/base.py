@@ -57,6 +57,7 @@ class Item(Protocol):
 
 
 ItemT = TypeVar("ItemT", bound=Item)
+_T = TypeVar("_T")
 
 
 @dataclass(frozen=True)
@@ -380,27 +381,25 @@ class SceneTrack(Track):
 def select_tasks(
     tasks: Sequence[AssemblyTask], suite: Suite, limit: int | None
 ) -> tuple[AssemblyTask, ...]:
-    """Return the tasks of a suite's levels, at most `limit`, in their order.
-
-    They are evenly spread, and a higher limit keeps all tasks of a lower one.
-    """
+    """Return the tasks of a suite's levels, at most `limit`, in their order."""
     chosen = [task for task in tasks if set(suite.levels) & set(task.scene.levels)]
-    kept = set(_fair_order([task.scene.level for task in chosen])[:limit])
-    return tuple(task for position, task in enumerate(chosen) if position in kept)
+    return limited(chosen, [task.scene.level for task in chosen], limit)
+
+
+def limited(items: Sequence[_T], strata: Sequence[int], limit: int | None) -> tuple[_T, ...]:
+    """Return at most `limit` items in their order, spread evenly over their strata and in each.
+
+    A higher limit keeps all items of a lower one.
+    """
+    kept = set(fair_order(strata)[:limit])
+    return tuple(item for position, item in enumerate(items) if position in kept)
 
 
 def interleaved(items: Sequence[ItemT]) -> list[ItemT]:
     """Return items in an order in which the first few are always a fair sample of levels and
     scenes.
     """
-    return [items[position] for position in _fair_order([item.scene.level for item in items])]
-
-
-def stratified(sizes: Sequence[int], limit: int) -> list[int]:
-    """Return how many of `limit` places each group of the given sizes gets, as by `_fair_order`."""
-    groups = [group for group, size in enumerate(sizes) for _ in range(size)]
-    chosen = [groups[position] for position in _fair_order(groups)[:limit]]
-    return [chosen.count(group) for group in range(len(sizes))]
+    return [items[position] for position in fair_order([item.scene.level for item in items])]
 
 
 def spread(size: int) -> list[int]:
@@ -413,7 +412,7 @@ def spread(size: int) -> list[int]:
     return list(dict.fromkeys(part * size // 2**digits for part in parts))
 
 
-def _fair_order(strata: Sequence[int]) -> list[int]:
+def fair_order(strata: Sequence[int]) -> list[int]:
     """Return all positions, alternating between strata by size and evenly spread in each.
 
     Every stratum gets one place before any gets two; then each place goes to the stratum with the

@@ -39,7 +39,7 @@ from phyblock.sim.pictures import (
     to_png,
 )
 from phyblock.text import hex_digest
-from phyblock.types import BACKGROUNDS
+from phyblock.types import BACKGROUNDS, View
 
 _Result = TypeVar("_Result")
 _WORKERS = 4
@@ -200,10 +200,10 @@ class LocalShop(Workshop):
         return self._keep(drawing, drawing.make()) if image is None else image
 
 
-def picture_style(images: ImagesSpec) -> PictureStyle:
-    """Return the style of pictures in a suite."""
+def picture_style(images: ImagesSpec, view: View | None = None) -> PictureStyle:
+    """Return the style of pictures in a suite, in its own view or another."""
     ground = images.background or BACKGROUNDS[0]
-    return PictureStyle.from_view(images.view, images.size_px, ground)
+    return PictureStyle.from_view(view or images.view, images.size_px, ground)
 
 
 def scene_drawings(task: AssemblyTask, images: ImagesSpec) -> tuple[Drawing, ...]:

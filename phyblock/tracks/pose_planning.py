@@ -5,14 +5,14 @@ from __future__ import annotations
 import functools
 import threading
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, replace
 from functools import partial
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from phyblock.config.validation import Fault, PictureControls, TemplateName, UniqueSome, checked
+from phyblock.config.validation import PictureControls, TemplateName
 from phyblock.domain.blocks import BlockType
 from phyblock.domain.scene import AssemblyTask, Block, CandidateSet, Plan, PoseStep, Scene
 from phyblock.files import bundled
@@ -38,7 +38,6 @@ from phyblock.scoring.pose import (
 )
 from phyblock.scoring.pose_matching import TOLERANCES_CM
 from phyblock.sim.balance import is_balanced, surely_stands
-from phyblock.sim.camera import VIEWS
 from phyblock.sim.contact import voxel_iou
 from phyblock.sim.dynamics import ExecutionLimits, execute, execution_physics, groups
 from phyblock.sim.engine import Pose, described_engine
@@ -71,19 +70,9 @@ _STILL_M, _STILL_DEG = 0.001, 1.0
 _ONE_AT_A_TIME = threading.Lock()
 
 
-def _oblique_first(views: tuple[View, ...]) -> Iterator[Fault]:
-    if views[0] != "oblique":
-        # The sheet has the first view; in any but oblique, different blocks look the same.
-        order = ["oblique", *(view for view in views if view != "oblique")]
-        yield Fault("must begin with oblique", f"[{', '.join(order)}]")
-
-
 class PoseSpec(PictureControls):
     """The pose_planning track: the form of requests."""
 
-    views: Annotated[UniqueSome[View], checked(_oblique_first)] = ("oblique", "top")
-    """Views of the goal, one picture each: oblique first, then any of front, side and top.
-    Candidates are shown in the first view."""
     prompt: TemplateName = "default"
     """default, or the path of a .j2 template."""
 
@@ -496,17 +485,13 @@ class PosePlanning(SceneTrack):
     spec: PoseSpec
 
     def draw(self, item: AssemblyTask) -> tuple[Drawing, ...]:
-        """Return the goal from every view, unless blind, and the sheet from the first view."""
-        style = picture_style(self.suite.images)
-        seen = {
-            view: replace(style, azimuth_deg=VIEWS[view][0], elevation_deg=VIEWS[view][1])
-            for view in self.spec.views
-        }
-        drawings = []
-        for name, view_style in () if item.is_blind else seen.items():
-            style = written_style(goal_style(item.scene, view_style))
-            drawings.append(Drawing.of(f"goal, {name}", ruled_key, ruled_png, item.scene, style))
-        style = written_style(seen[self.spec.views[0]])
+        """Return the goal from two views, unless blind, and the sheet of candidates."""
+        drawings, images = list[Drawing](), self.suite.images
+        views: tuple[View, ...] = () if item.is_blind else ("oblique", "top")
+        for view in views:
+            style = written_style(goal_style(item.scene, picture_style(images, view)))
+            drawings.append(Drawing.of(f"goal, {view}", ruled_key, ruled_png, item.scene, style))
+        style = written_style(picture_style(images, "oblique"))
         return (*drawings, Drawing.of(KIT_LABEL, kit_key, kit_png, item.candidates, style))
 
     def identity(self) -> dict[str, Any]:

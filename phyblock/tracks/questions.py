@@ -16,7 +16,6 @@ from pydantic import Field
 
 from phyblock.config.suite import Suite
 from phyblock.config.validation import (
-    Count,
     Flag,
     PictureControls,
     SubtaskName,
@@ -47,7 +46,7 @@ from phyblock.scoring.plan import chance
 from phyblock.sim.pictures import PictureStyle
 from phyblock.sim.question_pictures import question_key, question_png
 from phyblock.text import hex_digest
-from phyblock.tracks.base import Judgement, Track, spread, stratified
+from phyblock.tracks.base import Judgement, Track, limited
 from phyblock.tracks.measures import OVERALL, WHOLE, Cell, SampleCounts
 from phyblock.tracks.picking import Choice, Picking
 from phyblock.tracks.pictures import Drawing, picture_style
@@ -65,8 +64,6 @@ class VqaSpec(PictureControls):
     scenes are those of dataset."""
     subtasks: UniqueSome[SubtaskName] = (*SUBTASKS,)
     """Subtasks to ask about."""
-    per_subtask: Count | None = None
-    """Maximum number of questions per subtask; null: all."""
     circular: Flag = False
     """Ask every rotation of the options; a question is right only if all are."""
     prompt: TemplateName = "default"
@@ -422,9 +419,7 @@ class Vqa(Track):
         """Select questions. Raises SpecError if there are none."""
         suite, spec = self.suite, self.spec
         self.questions = known = open_questions(suite.files.folders[self.name], self.dataset)
-        tasks = select_questions(
-            known.questions, spec.subtasks, suite.levels, spec.per_subtask, self.limit
-        )
+        tasks = select_questions(known.questions, spec.subtasks, suite.levels, self.limit)
         if not tasks:
             where = suite.where("vqa", "subtasks")
             found = ", ".join(sorted({question.subtask for question in known.questions}))
@@ -509,28 +504,12 @@ def select_questions(
     questions: Sequence[Question],
     subtasks: Sequence[Subtask],
     levels: Sequence[int],
-    per_subtask: int | None,
     limit: int | None,
 ) -> tuple[Question, ...]:
-    """Return the questions of these subtasks about scenes of these levels, in the set's order.
-
-    At most `per_subtask` of each subtask are kept, and `limit` in all, shared over the subtasks.
-    The kept questions are spread evenly over the set, and a higher limit keeps them.
-    """
-    groups: dict[str, list[Question]] = {name: [] for name in SUBTASKS if name in subtasks}
-    for question in questions:
-        if question.subtask in groups and set(question.scene.levels) & set(levels):
-            groups[question.subtask].append(question)
-    found = [group for group in groups.values() if group]
-    shares = [min(per_subtask or len(group), len(group)) for group in found]
-    if limit is not None:
-        shares = stratified(shares, limit)
-    kept = {
-        group[place].id
-        for group, share in zip(found, shares, strict=True)
-        for place in spread(len(group))[:share]
-    }
-    return tuple(question for question in questions if question.id in kept)
+    """Return the questions of these subtasks about scenes of these levels, at most `limit`."""
+    wanted, named = set(levels), set(subtasks)
+    chosen = [one for one in questions if one.subtask in named and wanted & set(one.scene.levels)]
+    return limited(chosen, [SUBTASKS.index(one.subtask) for one in chosen], limit)
 
 
 TRACK = Vqa

@@ -258,7 +258,7 @@ def test_an_impatient_cancellation_keeps_all_that_was_answered(workspace, monkey
 def test_a_reply_whose_judging_kills_workers_is_recorded_and_scored_later(
     inside, monkeypatch, capsys
 ):
-    inside.write_suite(tracks=["pose_planning"], models=["oracle"], pose={"views": ["oblique"]})
+    inside.write_suite(tracks=["pose_planning"], models=["oracle"])
     marks = inside.root / "marks"
     marks.mkdir()
     whole = PosePlanning.judge_apart
@@ -298,7 +298,7 @@ def test_a_reply_whose_judging_kills_workers_is_recorded_and_scored_later(
 def test_a_reply_that_is_being_judged_at_a_second_interrupt_is_recorded(
     inside, monkeypatch, capsys
 ):
-    inside.write_suite(tracks=["pose_planning"], models=["oracle"], pose={"views": ["oblique"]})
+    inside.write_suite(tracks=["pose_planning"], models=["oracle"])
 
     async def slow(track, item, text, _):
         for _ in range(2):

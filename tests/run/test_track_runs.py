@@ -152,7 +152,7 @@ def shown(seen):
 
 def test_pictures_arrive_in_order_each_with_its_caption(workspace):
     server = OpenAIChat(say=a_cube)
-    done = run_with(workspace, server, subtasks=FEW_QUESTIONS, per_subtask=2)
+    done = run_with(workspace, server, "--limit", "8", subtasks=FEW_QUESTIONS)
     assert (done.code, done.err) == (0, "")
     drawn = pictures_of(workspace)
     by_text = {question.text: (question, labels) for question, labels in drawn.values()}
@@ -179,9 +179,8 @@ def test_pictures_arrive_in_order_each_with_its_caption(workspace):
 
 def test_circular_and_blind_a_question_counts_once_and_only_if_all_rotations_are_right(workspace):
     server = OpenAIChat(say=a_cube)
-    done = run_with(
-        workspace, server, circular=True, blind=True, subtasks=["SH", "CO"], per_subtask=3
-    )
+    asked = {"circular": True, "blind": True, "subtasks": ["SH", "CO"]}
+    done = run_with(workspace, server, "--limit", "6", **asked)
     assert (done.code, done.err) == (0, "")
     assert server.requests == 24
     made = {one["id"]: one for one in questions()}

@@ -9,13 +9,20 @@ from hypothesis import strategies as st
 
 from phyblock.errors import DataError
 from phyblock.records.record import Reply
-from phyblock.tracks.base import file_plan, in_order, presented, shown_order, spread, stratified
+from phyblock.tracks.base import fair_order, file_plan, in_order, presented, shown_order, spread
 from tests.tracks.conftest import track_of
 from tests.workspace import plan_text
 
 SIZES = st.lists(st.integers(1, 200), min_size=1, max_size=4)
 seeds = st.integers(0, 2**31 - 1)
 plans = st.lists(st.integers(-1, 18), max_size=8)
+
+
+def stratified(sizes, limit):
+    """How many of `limit` places each group of these sizes gets."""
+    groups = [group for group, size in enumerate(sizes) for _ in range(size)]
+    chosen = [groups[position] for position in fair_order(groups)[:limit]]
+    return [chosen.count(group) for group in range(len(sizes))]
 
 
 @given(SIZES, st.integers(1, 900))

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from phyblock.domain.scene import Block, Candidate, CandidateSet, PoseStep
-from phyblock.errors import SpecError, StoreError
+from phyblock.errors import StoreError
 from phyblock.parsing.poses import parse_poses
 from phyblock.records.files import known_records
 from phyblock.run.judge import begun, judged
@@ -187,8 +187,7 @@ def test_a_step_has_one_error_the_first_in_time(task, one, error, end):
 def test_a_run_that_was_cut_goes_on_and_is_scored_again_without_an_engine(
     inside, monkeypatch, capsys
 ):
-    section, models = {"views": ["oblique"]}, ["oracle", "oracle-2d"]
-    inside.write_suite(tracks=["pose_planning"], models=models, pose=section)
+    inside.write_suite(tracks=["pose_planning"], models=["oracle", "oracle-2d"])
     run = ["run", "suite.yaml", "--out", "out", "--no-report"]
     assert not call(*run)
     assert "Pose planning" in capsys.readouterr().out
@@ -216,19 +215,3 @@ def test_a_run_that_was_cut_goes_on_and_is_scored_again_without_an_engine(
     assert table.loc["oracle", shown].tolist() == [100] * 5
     assert table.loc["oracle-2d", "f1_a"] == 100
     assert table.loc["oracle-2d", "f1_c"] < 100
-
-
-@pytest.mark.parametrize(
-    ("views", "told"),
-    [
-        (["abov"], "is not one of the choices"),
-        (["top"], "allowed: [oblique, top]"),
-        (["front", "oblique"], "allowed: [oblique, front]"),
-        (["oblique", "oblique"], "is listed twice"),
-    ],
-)
-def test_a_view_that_is_none_or_cannot_carry_the_sheet_is_said(views, told):
-    with pytest.raises(SpecError) as caught:
-        track_of("pose_planning", pose={"views": views})
-    (problem,) = caught.value.problems
-    assert told in str(problem)

@@ -131,24 +131,22 @@ tasks = st.lists(st.sampled_from(SUBTASKS[:4]), max_size=60).map(
 some = st.lists(st.sampled_from(SUBTASKS[:7]), min_size=1, unique=True)
 
 
-@given(tasks, some, st.none() | st.integers(1, 5), st.none() | st.integers(1, 40))
-def test_no_more_than_wanted_of_each_and_in_all(given_tasks, subtasks, per_subtask, limit):
-    chosen = select_questions(given_tasks, subtasks, LEVELS, per_subtask, limit)
+@given(tasks, some, st.none() | st.integers(1, 40))
+def test_no_more_than_wanted_of_each_and_in_all(given_tasks, subtasks, limit):
+    chosen = select_questions(given_tasks, subtasks, LEVELS, limit)
     found = Counter(one.subtask for one in given_tasks)
     counts = Counter(one.subtask for one in chosen)
-    most = {name: min(found[name], per_subtask or found[name]) for name in subtasks}
+    most = {name: found[name] for name in subtasks}
     assert all(counts[name] <= most.get(name, 0) for name in SUBTASKS)
     assert len(chosen) == min(sum(most.values()), limit or sum(most.values()))
     positions = [given_tasks.index(one) for one in chosen]
     assert positions == sorted(set(positions))
 
 
-@given(tasks, some, st.integers(1, 5), st.integers(1, 40))
-def test_a_higher_limit_asks_all_that_a_lower_one_asks(given_tasks, subtasks, per_subtask, limit):
-    def keys(most_of_each, most):
-        kept = select_questions(given_tasks, subtasks, LEVELS, most_of_each, most)
+@given(tasks, some, st.integers(1, 40))
+def test_a_higher_limit_asks_all_that_a_lower_one_asks(given_tasks, subtasks, limit):
+    def keys(most):
+        kept = select_questions(given_tasks, subtasks, LEVELS, most)
         return {question.id for question in kept}
 
-    assert keys(None, limit) <= keys(None, limit + 1)
-    assert keys(per_subtask, None) <= keys(per_subtask + 1, None)
-    assert keys(per_subtask, limit) <= keys(per_subtask, limit + 1)
+    assert keys(limit) <= keys(limit + 1)
