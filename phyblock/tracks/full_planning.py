@@ -219,17 +219,10 @@ class FullPlanning(SceneTrack):
     varies = ("prompt", "background", "view", "candidate_order", "layout", "repeats")
 
     def open(self) -> None:
-        """Select scenes. Raises DataError if the data set lacks pictures that it must provide."""
+        """Select scenes."""
         super().open()
-        suite, dataset = self.suite, self.dataset
-        self._guess = blind_guesses(suite, dataset.tasks, suite.settings[0])
+        self._guess = blind_guesses(self.suite, self.dataset.tasks, self.suite.settings[0])
         self._scorers: dict[object, AssemblyScorer] = {}
-        lacking = [task.key for task in self.items if task.composite is None]
-        if self.shop is not None and suite.images.source == "dataset" and lacking:
-            message = f"has no picture of {len(lacking)} of {len(self.items)} scenes"
-            found = ", ".join(lacking[:8]) + (", ..." if len(lacking) > 8 else "")
-            hint, where = "render them: --set images.source=render", str(dataset.root)
-            raise DataError(Problem(where, message, "images.source", found, hint=hint))
 
     def open_prompt(self) -> Prompt:
         """Return the official prompt, or a template."""

@@ -337,7 +337,7 @@ DATA = (
     Bad("twice", scenes_text(lambda lines: [*lines, lines[0]]),
         ("scenes.jsonl:6: id", "scenes.jsonl:1 already")),
     Bad("none", scenes_text(lambda _: []), ("scenes.jsonl", "holds no scenes")),
-    Bad("no-png", checkout(None), ("official", "images.source", "found: 000", "render")),
+    Bad("no-png", checkout(None), ("scene 000: images.source", "has no picture", "render")),
     Bad("bad-png", checkout(b"no picture"), ("000.png", "is not a readable picture")),
     Bad("eps", checkout(EPS), ("000.png", "is not a readable picture", "PNG, JPEG, GIF or WebP")),
     Bad("dot-png", checkout(png((1, 1))), ("000.png", "found: 1 x 1 pixels", "10,000 pixels")),
