@@ -6,8 +6,7 @@ import os
 import re
 import shlex
 import sys
-import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -16,7 +15,7 @@ import click
 from rich import box
 from rich.console import Console
 from rich.measure import Measurement
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.progress import track
 from rich.table import Table
 from rich.text import Text
 
@@ -112,19 +111,11 @@ def _piece(view: TextTable, columns: Sequence[int], text_width: int | None = Non
     return table
 
 
-def tracked(items: Iterable[T], total: int | None, doing: str, noun: str = "scenes") -> Iterator[T]:
-    """Yield the items with a progress bar on a terminal, or occasional lines elsewhere."""
+def tracked(items: Iterable[T], total: int | None, doing: str) -> Iterable[T]:
+    """Return the items, with a progress bar on a terminal while they are taken."""
     console = make_console(stderr=True)
-    columns = (TextColumn(doing), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    shown_s, hidden = time.monotonic(), not console.is_terminal
-    with Progress(*columns, console=console, transient=True, disable=hidden) as progress:
-        bar = progress.add_task("", total=total)
-        for count, item in enumerate(items, 1):
-            progress.advance(bar)
-            if hidden and time.monotonic() - shown_s >= LINE_EVERY_S:
-                shown_s = time.monotonic()
-                console.print(f"{count:,}{'' if total is None else f' of {total:,}'} {noun}")
-            yield item
+    hidden = not console.is_terminal
+    return track(items, doing, total, console=console, transient=True, disable=hidden)
 
 
 def shown_path(path: Path) -> str:

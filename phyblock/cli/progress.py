@@ -22,6 +22,7 @@ from rich.text import Text
 
 from phyblock.cli.console import LINE_EVERY_S
 from phyblock.models.model import ModelEvent
+from phyblock.records.record import Record
 from phyblock.run.runner import (
     ModelStopped,
     RunEvent,
@@ -30,11 +31,11 @@ from phyblock.run.runner import (
     SampleDone,
     Stopping,
 )
-from phyblock.run.store import Summary
 from phyblock.scoring.plan import Counts
 from phyblock.text import counted, one_line
 from phyblock.types import FAILURES
 
+_HEADLINE = "aov"
 _SHOWN_EVERY_S = 0.1
 """Minimum time between two updates of the display [s]."""
 _SPEED_OVER_S = 600.0
@@ -46,31 +47,29 @@ class Tally:
     """The sums over a model's records; `counts` are of the headline matcher and setting."""
 
     task: Task
-    counts: Counts | None = None
+    counts: Counts = field(default_factory=lambda: Counts(0, 0, 0))
     cost_usd: float = 0.0
     unpriced: int = 0
     cached: int = 0
     retries: int = 0
-    logged: int = 0
-    logged_s: float = -math.inf
-    last_retry: str = ""
     failures: Counter[str] = field(default_factory=Counter)
 
-    def add(self, sample: Summary) -> None:
+    def add(self, record: Record) -> None:
         """Count one sample."""
-        self.failures.update([sample.outcome] if sample.outcome in FAILURES else [])
-        if sample.counts is not None:
-            self.counts = sample.counts if self.counts is None else self.counts + sample.counts
-        if sample.cached is not None:
-            self.cached += sample.cached
-            self.unpriced += sample.paid_usd is None
-            self.cost_usd += sample.paid_usd or 0.0
+        self.failures.update([record.outcome] if record.outcome in FAILURES else [])
+        score = next((one for one in record.scores if one.criterion == _HEADLINE), None)
+        if score is not None:
+            self.counts += Counts(score.tp, score.fp, score.fn)
+        if record.reply is not None:
+            self.cached += record.reply.cached
+            self.unpriced += record.paid_usd is None
+            self.cost_usd += record.paid_usd or 0.0
 
     @property
     def facts(self) -> str:
         """Return the text beside the bar."""
         facts = []
-        if self.counts is not None and self.counts.f1 is not None:
+        if self.counts.f1 is not None:
             facts.append(f"F1 {100 * self.counts.f1:.1f} %")
         if self.cost_usd or self.unpriced:
             facts.append(f"${self.cost_usd:,.2f}" + (" + unknown" if self.unpriced else ""))
@@ -82,7 +81,7 @@ class Tally:
 class ProgressView:
     """Shows the progress of a run; use it as a context manager and as the run's watcher.
 
-    Notices are printed as lines, and so are repeated calls, at most once in ten seconds per model.
+    Notices are printed as lines, and so is the first repeated call of each model.
     """
 
     def __init__(self, console: Console, now: Callable[[], float] = time.monotonic) -> None:
@@ -113,15 +112,13 @@ class ProgressView:
 
     def __exit__(self, *_: object) -> None:
         self._progress.stop()
-        self._log_retries(math.inf)
 
     def __call__(self, event: RunEvent) -> None:
         """Update the display for an event."""
         if isinstance(event, RunStarted):
-            for name, expected in event.expected.items():
-                known = event.earlier[name]
+            for name, known in event.earlier.items():
                 number = self._progress.add_task(
-                    one_line(name), total=expected, completed=len(known), facts=""
+                    one_line(name), total=event.expected, completed=len(known), facts=""
                 )
                 task = next(task for task in self._progress.tasks if task.id == number)
                 self._tallies[name] = tally = Tally(task)
@@ -130,13 +127,15 @@ class ProgressView:
         elif isinstance(event, SampleDone):
             self._has_asked = True
             tally = self._tallies[event.record.model]
-            tally.add(Summary.of(event.record))
+            tally.add(event.record)
             self._progress.advance(tally.task.id)
         elif isinstance(event, ModelEvent) and event.kind == "retry":
             tally = self._tallies[event.model]
             tally.retries += 1
-            tally.last_retry = f"{event.message}; waiting {round(event.wait_s, 1):g} s"
             self._has_asked = True
+            if tally.retries == 1:
+                wait = f"waiting {round(event.wait_s, 1):g} s; more are counted as sent again"
+                self._print(f"{event.model}: {event.message}; {wait}")
         elif isinstance(event, ModelEvent):
             # A batch that was sent has no calls in progress.
             self._has_asked = True
@@ -158,7 +157,6 @@ class ProgressView:
         preparing = "" if self._has_asked else self._preparing(now_s)
         for tally in self._tallies.values():
             self._progress.update(tally.task.id, facts=preparing or tally.facts)
-        self._log_retries(now_s)
         if not self._is_terminal and now_s - self._last_line_s >= LINE_EVERY_S:
             self._last_line_s = now_s
             self._print(self._line(now_s))
@@ -179,15 +177,6 @@ class ProgressView:
         """Print a line; a closed output must not end calls that cost money."""
         with contextlib.suppress(OSError):
             self._console.print(Text(one_line(line), style=style))
-
-    def _log_retries(self, now_s: float) -> None:
-        """Log repeated calls: the first at once, then at most a line per model in ten seconds."""
-        for model, tally in list(self._tallies.items()):
-            more = tally.retries - tally.logged
-            if more and now_s - tally.logged_s >= LINE_EVERY_S:
-                tally.logged, tally.logged_s = tally.retries, now_s
-                again = counted(more, "call")
-                self._print(f"{model}: {again} sent again; last: {tally.last_retry}")
 
     def _preparing(self, now_s: float) -> str:
         return f"Preparing scenes ... ({_duration(now_s - self._started_s)})"

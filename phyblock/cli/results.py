@@ -25,7 +25,7 @@ from phyblock.cli.console import (
 )
 from phyblock.errors import DataError, Problem, SpecError, StoreError
 from phyblock.results.text import REPORT_FILE, TABLES, Summary, kept_summary, sources
-from phyblock.text import counted, did_you_mean, one_line, some_of
+from phyblock.text import counted, one_line, some_of
 
 if TYPE_CHECKING:
     from phyblock.records.record import Record
@@ -209,11 +209,7 @@ def _find(run: Path, sample: str) -> Record:
     many = f"holds {counted(len(matching), 'such sample')}"
     message = many if matching else "holds no such sample"
     allowed = some_of(matching or list(starts))
-    # A name may be given in part, so like ones are found part by part.
-    parts = {part for name in starts for part in name.split("/")}
-    hints = (did_you_mean(part, parts) for part in sample.split("/") if part not in parts)
-    hint = "" if matching else next(filter(None, hints), "")
-    raise StoreError(Problem(str(run / RECORDS), message, "sample", sample, allowed, hint))
+    raise StoreError(Problem(str(run / RECORDS), message, "sample", sample, allowed))
 
 
 def _print_prompt(console: Console, run: Path, record: Record) -> None:

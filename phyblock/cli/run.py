@@ -8,7 +8,6 @@ import gc
 import signal
 from collections.abc import Callable, Sequence
 from functools import partial
-from importlib import import_module
 from pathlib import Path
 from threading import Thread
 from typing import Any
@@ -137,8 +136,6 @@ def run(
     # Suite, scenes and modules stay to the end: collecting garbage among them repeatedly takes a
     # tenth of a run. So do records, while tables are made from them.
     gc.freeze()
-    if not is_as_it_was:
-        Thread(target=_import_for_tables).start()
     with ProgressView(console) as view:
         session = Session(plan, folder, view, **asks)
         result = completed(session, _SIGNALS, view.tick)
@@ -147,12 +144,6 @@ def run(
     code = _conclude(console, folder, result, view)
     print_path(console, made)
     return code
-
-
-def _import_for_tables() -> None:
-    """Import what tables need, which takes a third of a second, while models are asked."""
-    for module in ("phyblock.results.tables", "scipy.special"):
-        import_module(module)
 
 
 def _conclude(console: Console, folder: Path, result: RunResult, view: ProgressView) -> int:
@@ -327,7 +318,7 @@ def score(
     work = f"score {read_manifest(run).identity}: {code_versions()}\n"
     shards = open_shards(shard, run, work)
     with open_workers(jobs, ray_address, shards, size=64) as workers:
-        watch = partial(tracked, total=None, doing="Scoring", noun="samples")
+        watch = partial(tracked, total=None, doing="Scoring")
         rescore(run, data, make_console(stderr=True).print, watch, workers)
     if left_to_first(shards, run):
         return

@@ -126,10 +126,6 @@ def _check(path: Path, sets: tuple[str, ...], models_file: str | None) -> str:
         return f"data set {dataset.name}, {scenes} ({by_level})"
     path = find_suite(str(path))
     data = read_yaml(path).data
-    if isinstance(data, dict) and isinstance(data.get("blocks"), list):
-        message, allowed = "holds scenes", "a suite, a models file, or the folder of a data set"
-        hint = f"`phyblock scenes complete {shown_path(path)}` makes a data set of them"
-        raise SpecError(Problem(str(path), message, allowed=allowed, hint=hint))
     if isinstance(data, dict) and data.keys() & suite_model().model_fields.keys():
         suite = read_suite(str(path), sets)
         named = find_models_file(models_file, path)

@@ -6,7 +6,7 @@ import asyncio
 import contextlib
 import functools
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
@@ -40,7 +40,7 @@ def rescore(
     folder: Path,
     data: Path | None = None,
     report: Callable[[str], object] = lambda _: None,
-    watch: Callable[[Iterator[_Judged]], Iterator[_Judged]] = iter,
+    watch: Callable[[Iterable[_Judged]], Iterable[_Judged]] = iter,
     workers: Workers | None = None,
 ) -> None:
     """Judge every stored reply of a run again and replace its records in one step.
@@ -63,7 +63,7 @@ def rescore(
         if workers is not None and not workers.is_here:
             work = partial(_judge_there, folder.resolve(), None if data is None else data.resolve())
         lines = run_records(folder, manifest, whole=True)
-        for record, again in watch(iter(share(work, lines))):
+        for record, again in watch(share(work, lines)):
             diverged[record.track] += again.error is not None and record.error is None
             yield again
 

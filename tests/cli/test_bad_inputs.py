@@ -449,7 +449,6 @@ FOLDERS = (
         ("out/run.yaml: suite.name", "suite.models"), 2),
     Bad("manifest-data", manifest_without("dataset", "score", "out"), ("out/run.yaml", "dataset")),
     Bad("show-none", command("show", "out", "no-such"), ("no-such", "holds no such sample")),
-    Bad("show-like", command("show", "out", "ramdon/t1"), ("did you mean random?",)),
     Bad("export-nothing", command("export", "--to", "csv"), ("Name the folder of a run",)),
     Bad("show-several", command("show", "out", "random"), ("holds 5 such samples", "allowed: ")),
     Bad("no-run", command("report", "data"), ("data: holds no run.yaml",)),

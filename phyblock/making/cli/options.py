@@ -67,12 +67,10 @@ def begin_set(
     return open_shards(shard, out, f"{work}\n{described_engine()}\n{code_digest()}\n")
 
 
-def mapped(
-    function: Callable[[T], R], items: Sequence[T], jobs: int, doing: str, noun: str = "scenes"
-) -> list[R]:
+def mapped(function: Callable[[T], R], items: Sequence[T], jobs: int, doing: str) -> list[R]:
     """Return the results of a function for the items, from `jobs` processes, with progress."""
     with open_workers(min(jobs, len(items) or 1)) as workers:
-        return list(tracked(workers.map(function, items), len(items), doing, noun))
+        return list(tracked(workers.map(function, items), len(items), doing))
 
 
 def print_engine() -> None:

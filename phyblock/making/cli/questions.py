@@ -124,7 +124,7 @@ def verify(questions: str, data: str, jobs: int) -> None:
     read = _read(questions, data)
     # Questions about one scene are processed together, so that pictures are shared.
     asked = sorted(read.questions, key=lambda question: question.scene.id)
-    problems = mapped(problem_of, asked, jobs, "Verifying", "questions")
+    problems = mapped(problem_of, asked, jobs, "Verifying")
     counts = Counter(question.subtask for question in asked)
     failed = Counter(q.subtask for q, p in zip(asked, problems, strict=True) if p)
     files, changed = check_sums(read.root)
@@ -197,7 +197,7 @@ def audit(questions: str, data: str) -> None:
     """
     asked = list(_read(questions, data).questions)
     subtasks = len({question.subtask for question in asked})
-    audits = list(tracked(audit_questions(asked), subtasks, "Auditing", "subtasks"))
+    audits = list(tracked(audit_questions(asked), subtasks, "Auditing"))
     rows = [
         (
             one.subtask,

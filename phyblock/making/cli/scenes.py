@@ -419,8 +419,7 @@ def render(
     work = f"scenes render: {read.sha256} {hex_digest(repr([RENDER_VERSION, *drawings]))}\n"
     shards = open_shards(shard, out, work)
     with open_workers(jobs, ray_address, shards) as workers:
-        drawn = workers.map(call, drawings.values())
-        drawn = tracked(drawn, len(drawings), "Drawing", "pictures")
+        drawn = tracked(workers.map(call, drawings.values()), len(drawings), "Drawing")
         for name, picture in zip(drawings, drawn, strict=True):
             if shards is None or shards.writes:
                 folder.write({name: picture})
