@@ -83,8 +83,8 @@ def test_values_are_added_one_after_another(values):
 
 def texts():
     """Features of options' texts, by which drafts are kept and the text probe answers."""
-    questions = built_in_questions().questions[::5]
-    return [text_features(question.text, question.options) for question in questions]
+    tasks = built_in_questions().tasks[::5]
+    return [text_features(task.question.text, task.question.options) for task in tasks]
 
 
 def solids():

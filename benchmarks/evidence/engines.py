@@ -101,7 +101,7 @@ def main() -> None:
         parser.exit(2, f"both engines must be installed, here is {' and '.join(engines)}\n")
     rng = np.random.default_rng(args.seed)
     scenes = read_builtin(bundled("benchmarks", "data", "phyblock-400"))
-    questions = read_questions(bundled("benchmarks", "data", "phyblock-vqa"), scenes).questions
+    tasks = read_questions(bundled("benchmarks", "data", "phyblock-vqa"), scenes).tasks
     table: dict[str, Agreement] = {}
     seconds = dict.fromkeys(engines, 0.0)
 
@@ -117,7 +117,7 @@ def main() -> None:
             one = table.setdefault(what, Agreement())
             if not one.add(stands, len(set(fallen)) == 1) and args.list:
                 print(f"{name}: {dict(zip(engines, fallen, strict=True))}")
-    dynamic = [question for question in questions if question.category == DYNAMIC]
+    dynamic = [task.question for task in tasks if task.question.category == DYNAMIC]
     for question in dynamic[::every]:
         problems = []
         for engine in engines:

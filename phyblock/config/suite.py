@@ -507,7 +507,7 @@ def load_suite(
         kind = known_track(name)
         if kind.has_own_data():
             own = getattr(suite, kind.section)
-            folders[name] = data(own.path, (kind.section, "path"), True)
+            folders[name] = data(own.path, (kind.section, "path"), own.format == "builtin")
         prompts: dict[str, FieldPath] = {
             text: ("vary", "prompt", n) for n, text in enumerate(suite.vary.prompt)
         }

@@ -9,8 +9,8 @@ from __future__ import annotations
 import functools
 import json
 import re
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, fields
 from functools import partial
 from pathlib import Path
 from typing import TypeVar
@@ -18,9 +18,9 @@ from typing import TypeVar
 from phyblock.config.validation import Fault
 from phyblock.config.yaml import dotted
 from phyblock.domain.question import Question
-from phyblock.domain.scene import AssemblyTask
+from phyblock.domain.scene import AssemblyTask, Scene
 from phyblock.errors import DataError, Problem, reason_of
-from phyblock.files import read_bytes
+from phyblock.files import LARGEST_PICTURE_BYTES, read_bytes
 from phyblock.text import did_you_mean, hex_digest, some_of
 
 VERSION_FILE = "VERSION"
@@ -59,17 +59,45 @@ class Dataset:
 
 
 @dataclass(frozen=True)
+class QuestionTask:
+    """A question; `files` are pictures of the data set by label, used instead of recipes."""
+
+    question: Question
+    files: Mapping[str, Path] = field(default_factory=dict)
+
+    @property
+    def key(self) -> str:
+        """The id of the question."""
+        return self.question.id
+
+    @property
+    def scene(self) -> Scene:
+        """The scene as shown in the question."""
+        return self.question.scene
+
+
+@dataclass(frozen=True)
 class QuestionSet:
     """Questions in the order of the file; `root` is the folder they were read from."""
 
     name: str
     root: Path
-    questions: tuple[Question, ...]
+    tasks: tuple[QuestionTask, ...]
 
     @functools.cached_property
     def sha256(self) -> str:
-        """Hex digest of the questions with their scenes."""
-        return _digest([[question, {}] for question in self.questions])
+        """Hex digest of the questions with their scenes and of the picture files' bytes."""
+        return _digest([[task.question, _digests(task.files)] for task in self.tasks])
+
+
+def _digests(files: Mapping[str, Path]) -> dict[str, str]:
+    digests: dict[str, str] = {}
+    for label, path in sorted(files.items()):
+        try:
+            digests[label] = hex_digest(read_bytes(path, LARGEST_PICTURE_BYTES))
+        except (OSError, ValueError) as error:
+            raise DataError(Problem(str(path), f"cannot be read: {reason_of(error)}")) from error
+    return digests
 
 
 def _digest(content: object) -> str:

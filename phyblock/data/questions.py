@@ -5,7 +5,7 @@ Pictures are recipes: each describes its differences from the question's scene.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -14,7 +14,7 @@ from pydantic import Field, StrictInt, TypeAdapter
 
 from phyblock.config.validation import BackgroundName, Fault, ShapeName, SubtaskName, checked
 from phyblock.config.yaml import shown
-from phyblock.data.base import Dataset, QuestionSet, read_lines, read_set, report
+from phyblock.data.base import Dataset, QuestionSet, QuestionTask, read_lines, read_set, report
 from phyblock.data.scenes import (
     MAX_BLOCKS,
     Angles,
@@ -37,13 +37,16 @@ from phyblock.domain.question import (
     is_picture_option,
 )
 from phyblock.domain.scene import Block, Scene
+from phyblock.errors import DataError, Problem
 from phyblock.records.record import Line, decode
-from phyblock.text import some_of
 from phyblock.types import Background
 
 QUESTIONS_FILE = "questions.jsonl"
 _MOST_OPTIONS = 26
 _MOST_PICTURES = 2 + len(LETTERS)
+_FEW = 20
+"""Maximum number of faulty lines that are reported one by one."""
+_NO_SCENE = "names no scene of the data set"
 
 
 class StoredPose(Line, extra="ignore"):
@@ -288,21 +291,38 @@ def _wrong(field: str, message: str, allowed: str, found: object) -> Fault:
     return Fault(message, allowed, shown(found), (field,))
 
 
+def scene_of(name: str, scenes: Mapping[str, Scene], where: str) -> Scene:
+    """Return the scene of a question. Raises DataError if the data set does not have it."""
+    if name not in scenes:
+        allowed = f"one of the {len(scenes)} scenes of the data set"
+        report([_wrong("scene_id", _NO_SCENE, allowed, name)], where)
+    return scenes[name]
+
+
 def read_questions(folder: Path, scenes: Dataset) -> QuestionSet:
-    """Return all questions of a folder, about these scenes. Raises DataError with all problems."""
+    """Return all questions of a folder, about these scenes. Raises DataError with all problems.
+
+    If most are about scenes of another data set, only that is reported.
+    """
     known = {task.scene.id: task.scene for task in scenes.tasks}
 
     adapter = TypeAdapter(StoredQuestion)
 
-    def read(line: bytes, where: str) -> Question:
+    def read(line: bytes, where: str) -> QuestionTask:
         stored = decode(adapter, line, where, StoredQuestion)
-        if stored.scene_id not in known:
-            allowed, message = some_of(list(known)), "names no scene of the data set"
-            report([_wrong("scene_id", message, allowed, stored.scene_id)], where)
-        scene = known[stored.scene_id]
+        scene = scene_of(stored.scene_id, known, where)
         report(stored.faults(scene), where)
-        return stored.about(scene)
+        return QuestionTask(stored.about(scene))
 
     path = folder / QUESTIONS_FILE
-    questions = read_lines(path, read_set(path), "question", read, lambda one: one.id)
-    return QuestionSet(folder.name, folder, tuple(questions))
+    try:
+        tasks = read_lines(path, read_set(path), "question", read, lambda task: task.key)
+    except DataError as error:
+        elsewhere = [one for one in error.problems if one.message == _NO_SCENE]
+        if len(elsewhere) < max(_FEW, len(error.problems) / 2):
+            raise
+        message = "asks about scenes of another data set"
+        found, allowed = f"the data set {scenes.name}", "questions about its scenes"
+        hint = "make questions about it, or name the data set that they are about"
+        raise DataError(Problem(str(path), message, "", found, allowed, hint)) from error
+    return QuestionSet(folder.name, folder, tuple(tasks))

@@ -94,6 +94,8 @@ class ManifestDataset(Line):
 class ManifestQuestions(Line):
     """The question set."""
 
+    format: str
+    """Its layout."""
     root: str
     """The folder that it was in."""
     version: Version = 1

@@ -20,7 +20,7 @@ from phyblock.parsing.text import READER_VERSION
 from phyblock.records.files import FORMAT, Manifest
 from phyblock.sim.engine import ENGINES, described_engine
 from phyblock.text import hex_digest
-from phyblock.tracks.base import Track, simulating
+from phyblock.tracks.base import Track, kind_of, simulating
 
 _ENGINES = (engine.distribution for engine in ENGINES.values())
 _LIBRARIES = ("litellm", *_ENGINES, "numpy", "pillow", "jinja2")
@@ -79,8 +79,9 @@ def make_manifest(
             libraries[name] = version(name)
     engine = {"engine": described_engine()} if simulating(suite.model_dump()) else {}
     questions: dict[str, Any] = {}
-    for root in suite.files.folders.values():
-        about = {"root": str(root), "version": read_version(root)}
+    for name, root in suite.files.folders.items():
+        form = getattr(suite, kind_of(name).section).format
+        about = {"format": form, "root": str(root), "version": read_version(root)}
         questions = questions or {"questions": about}
     fields = {
         "identity": identity,

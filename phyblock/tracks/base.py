@@ -162,8 +162,8 @@ class Track(ABC):
 
     @classmethod
     def has_own_data(cls) -> bool:
-        """True if its section names its own data by `path`."""
-        return cls.options is not None and "path" in cls.options.model_fields
+        """True if its section names its own data, by `path` and `format`."""
+        return cls.options is not None and {"path", "format"} <= cls.options.model_fields.keys()
 
     @classmethod
     def template_for(cls, form: AnswerFormat) -> Path | None:

@@ -7,6 +7,7 @@ import json
 from collections import Counter
 from collections.abc import Callable, Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -21,7 +22,8 @@ from phyblock.config.validation import (
     TemplateName,
     UniqueSome,
 )
-from phyblock.data.base import Dataset, QuestionSet
+from phyblock.data.base import Dataset, QuestionSet, QuestionTask
+from phyblock.data.official import read_official_questions
 from phyblock.data.questions import QUESTIONS_FILE, read_questions
 from phyblock.domain.question import (
     CATEGORIES,
@@ -32,10 +34,11 @@ from phyblock.domain.question import (
     Subtask,
     is_picture_option,
     rotated,
+    rotated_label,
 )
 from phyblock.domain.scene import Scene
 from phyblock.errors import DataError, Problem, SpecError
-from phyblock.files import bundled, bundled_sets
+from phyblock.files import bundled, bundled_sets, read_picture
 from phyblock.models.request import Image
 from phyblock.parsing.answer import ParsedAnswer, choice_form, parse_answer
 from phyblock.parsing.text import AnswerForm
@@ -49,7 +52,7 @@ from phyblock.tracks.base import Judgement, Track, limited
 from phyblock.tracks.measures import OVERALL, WHOLE, Cell, SampleCounts
 from phyblock.tracks.picking import Choice, Picking
 from phyblock.tracks.pictures import Drawing, picture_style
-from phyblock.types import Background
+from phyblock.types import Background, DataFormat
 
 BUILTIN_QUESTIONS = "phyblock-vqa"
 """The question set of suites that name none."""
@@ -58,6 +61,9 @@ BUILTIN_QUESTIONS = "phyblock-vqa"
 class VqaSpec(PictureControls):
     """The questions of the vqa track and their presentation."""
 
+    format: DataFormat = "builtin"
+    """builtin: a folder with questions.jsonl. official: a folder with question files in the
+    official JSON form and their pictures."""
     path: Annotated[str, Field(min_length=1)] = BUILTIN_QUESTIONS
     """Name of a bundled question set (phyblock-vqa), or a folder, relative as in dataset.path. Its
     scenes are those of dataset."""
@@ -356,24 +362,24 @@ def pick_answer(subject: ChoiceSubject) -> Picking:
 class AskedQuestion:
     """A question with its options in one order; `rotation` 0 is that of the data set."""
 
-    original: Question
+    task: QuestionTask
     rotation: int = 0
     is_one_of_many: bool = False
 
     @functools.cached_property
     def question(self) -> Question:
         """The question as shown."""
-        return rotated(self.original, self.rotation)
+        return rotated(self.task.question, self.rotation)
 
     @property
     def key(self) -> str:
         """The question's id, with the rotation if all are asked."""
-        return f"{self.original.id}-r{self.rotation}" if self.is_one_of_many else self.original.id
+        return f"{self.task.key}-r{self.rotation}" if self.is_one_of_many else self.task.key
 
     @property
     def scene(self) -> Scene:
         """The scene as the question shows it."""
-        return self.original.scene
+        return self.task.scene
 
 
 def question_drawings(
@@ -382,11 +388,17 @@ def question_drawings(
     """Return the pictures of a question: scene, the block by itself if there is one, options.
 
     `background` overrides the backgrounds of questions; questions without one have the style's.
+    Raises DataError for a missing picture.
     """
     recipes = {recipe.label: recipe for recipe in item.question.pictures}
+    n, files = len(item.question.options), item.task.files
+    paths = {rotated_label(at, item.rotation, n): path for at, path in files.items()}
     drawings = {}
     for label in ("scene", "block", *LETTERS):
-        if label in recipes:
+        if label in paths:
+            read = partial(read_picture, paths[label])
+            drawings[label] = Drawing(label, hex_digest(read()), read, is_file=True)
+        elif label in recipes:
             recipe = recipes[label]
             recipe = replace(recipe, background=background or recipe.background)
             drawings[label] = Drawing.of(label, question_key, question_png, recipe, style)
@@ -417,11 +429,13 @@ class Vqa(Track):
     def open(self) -> None:
         """Select questions. Raises SpecError if there are none."""
         suite, spec = self.suite, self.spec
-        self.questions = known = open_questions(suite.files.folders[self.name], self.dataset)
-        tasks = select_questions(known.questions, spec.subtasks, suite.levels, self.limit)
+        self.questions = known = open_questions(
+            spec.format, suite.files.folders[self.name], self.dataset
+        )
+        tasks = select_questions(known.tasks, spec.subtasks, suite.levels, self.limit)
         if not tasks:
             where = suite.where("vqa", "subtasks")
-            found = ", ".join(sorted({question.subtask for question in known.questions}))
+            found = ", ".join(sorted({task.question.subtask for task in known.tasks}))
             message = "no question is of these subtasks and levels"
             raise SpecError(Problem(where, message, "vqa.subtasks", found=f"questions of {found}"))
         self.items = tuple(
@@ -429,7 +443,7 @@ class Vqa(Track):
             for task in tasks
             for rotation in range(spec.rotations)
         )
-        self._guesses = Guesses(known.questions, majority_rule)
+        self._guesses = Guesses([task.question for task in known.tasks], majority_rule)
 
     def draw(self, item: AskedQuestion) -> tuple[Drawing, ...]:
         """Return the pictures of a question in the style of the suite."""
@@ -490,8 +504,10 @@ class Vqa(Track):
         return Judgement(parsed.rule is not None, fields)
 
 
-def open_questions(path: Path, dataset: Dataset) -> QuestionSet:
+def open_questions(format_name: str, path: Path, dataset: Dataset) -> QuestionSet:
     """Read a question set about the scenes of a data set. Raises DataError if it is missing."""
+    if format_name == "official":
+        return read_official_questions(path, dataset)
     if (path / QUESTIONS_FILE).is_file():
         return read_questions(path, dataset)
     names = ", ".join(bundled_sets(QUESTIONS_FILE))
@@ -500,15 +516,19 @@ def open_questions(path: Path, dataset: Dataset) -> QuestionSet:
 
 
 def select_questions(
-    questions: Sequence[Question],
+    tasks: Sequence[QuestionTask],
     subtasks: Sequence[Subtask],
     levels: Sequence[int],
     limit: int | None,
-) -> tuple[Question, ...]:
+) -> tuple[QuestionTask, ...]:
     """Return the questions of these subtasks about scenes of these levels, at most `limit`."""
     wanted, named = set(levels), set(subtasks)
-    chosen = [one for one in questions if one.subtask in named and wanted & set(one.scene.levels)]
-    return limited(chosen, [SUBTASKS.index(one.subtask) for one in chosen], limit)
+    chosen = [
+        one
+        for one in tasks
+        if one.question.subtask in named and wanted & set(one.question.scene.levels)
+    ]
+    return limited(chosen, [SUBTASKS.index(one.question.subtask) for one in chosen], limit)
 
 
 TRACK = Vqa

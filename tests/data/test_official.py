@@ -3,13 +3,18 @@
 import json
 import os
 from collections import Counter
+from datetime import date
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from PIL import Image
 
 from phyblock.data.official import (
     match_published,
     official_prompt,
     read_official,
+    read_official_questions,
     recorded_models,
 )
 from phyblock.data.scenes import read_builtin
@@ -118,15 +123,17 @@ def test_recorded_models_are_the_folders_that_hold_replies(tmp_path):
     assert list(recorded_models(tmp_path)) == ["a", "b"]
 
 
-def test_the_official_prompt_is_what_all_recordings_carry_that_carry_one(tmp_path):
+def test_the_official_prompt_is_what_most_recordings_carry(tmp_path):
     record(tmp_path, "plain", "000", {"choices": []})
-    with pytest.raises(DataError, match="carry 0 official prompts"):
+    with pytest.raises(DataError, match="no recording carries the official prompt"):
         official_prompt(tmp_path)
     record(tmp_path, "a", "000", {"instruction": "<IMG_CONTEXT><IMG_CONTEXT>Build it."})
     record(tmp_path, "b", "000", {"instruction": "<|image_pad|><|image_pad|>Build it."})
     assert official_prompt(tmp_path) == "Build it."
     record(tmp_path, "c", "000", {"instruction": "<image>\n<image>Build this."})
-    with pytest.raises(DataError, match="carry 2 official prompts"):
+    assert official_prompt(tmp_path) == "Build it."
+    record(tmp_path, "d", "000", {"instruction": "Build this."})
+    with pytest.raises(DataError, match="different prompts"):
         official_prompt(tmp_path)
 
 
@@ -145,16 +152,167 @@ def test_the_official_scenes(official_checkout):
             assert base.issuperset(task.scene.parents)
 
 
-ROWS = [*dict.fromkeys([*published_table(1)["model"], *published_table(2)["model"]])]
-FOLDERS = {
-    "claude-3-5-haiku": "Claude-3.5 Haiku",
-    "claude-3-7-thinking": "Claude-3.7 Sonnet-Thinking",
-    "Qwen-VL-max": "Qwen-VL-Max",
-    "gpt-o1": "GPT-o1",
-    **dict.fromkeys(("InternVL2.5-4B", "claude-3-5", "gemini-2.0", "", "random-4")),
+COLOR = {
+    "scene_id": "t1",
+    "question": "What is the color of the block on top?",
+    "options": ["red", "blue", "green", "yellow"],
+    "answer": "B",
+}
+NEXT = {
+    "scene_id": "t2",
+    "question": "What comes next?",
+    "options": ["<img1>", "<img2>", "<img3>", "<img4>"],
+    "answer": "<img3>",
 }
 
 
-@pytest.mark.parametrize(("name", "row"), [*FOLDERS.items(), *zip(ROWS, ROWS, strict=True)])
-def test_rows_are_found_by_names_of_models_and_of_folders(name, row):
-    assert match_published(name) == match_published(name.upper()) == row
+def write(folder, name, content):
+    folder.mkdir(parents=True, exist_ok=True)
+    text = content if isinstance(content, str) else json.dumps(content, indent=2)
+    (folder / name).write_text(text, encoding="utf-8")
+    return folder
+
+
+def draw(folder, *names):
+    for name in names:
+        path = folder / "images" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        Image.new("RGB", (8, 8), "red").save(path)
+
+
+def problems(folder, towers):
+    with pytest.raises(DataError) as caught:
+        read_official_questions(folder, towers)
+    return [str(problem) for problem in caught.value.problems]
+
+
+def test_texts_pictures_and_orders_are_read(tmp_path, towers):
+    write(tmp_path, "color.json", [COLOR, {**COLOR, "id": "mine", "answer": "blue"}])
+    write(tmp_path, "PD.json", [NEXT])
+    write(tmp_path, "Ordering.json", [{**NEXT, "answer": "CABD"}])
+    draw(tmp_path, *(f"pd-001/img{i}.png" for i in range(1, 5)), "t1.png")
+    draw(tmp_path, *(f"or-001/img{i}.jpg" for i in range(1, 5)))
+    found = {task.key: task for task in read_official_questions(tmp_path, towers).tasks}
+    assert {name: task.question.subtask for name, task in found.items()} == {
+        "pd-001": "PD", "or-001": "OR", "co-001": "CO", "mine": "CO"
+    }  # fmt: skip
+    assert found["co-001"].question.answer_letters == "B" == found["mine"].question.answer_letters
+    assert found["co-001"].files == {"scene": tmp_path / "images" / "t1.png"}
+    assert found["co-001"].question.pictures == ()
+    assert found["pd-001"].question.answer_letters == "C"
+    assert list(found["pd-001"].files) == list("ABCD")
+    assert [p.label for p in found["pd-001"].question.pictures] == ["scene"]
+    assert found["or-001"].question.answer == (2, 0, 1, 3)
+    assert found["or-001"].question.pictures == ()
+
+
+FAULTS = [
+    ({"answer": "E"}, "answer: is none of the options"),
+    ({"answer": "purple"}, "answer: is none of the options"),
+    ({"scene_id": "t9"}, "scene_id: names no scene of the data set"),
+    ({"options": NEXT["options"]}, "options: the file is missing"),
+    ({"id": "co-001"}, "id: is used at"),
+]
+
+
+@pytest.mark.parametrize(("change", "message"), FAULTS)
+def test_each_fault_is_one_error_with_file_and_place(tmp_path, towers, change, message):
+    write(tmp_path, "CO.json", [COLOR, {**COLOR, **change}])
+    (problem,) = problems(tmp_path, towers)
+    assert problem.startswith(f"{tmp_path / 'CO.json'}[1]: {message}")
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("CO.json", "{", "is not JSON"),
+        ("CO.json", '{"scene_id": 1}', "has the wrong type"),
+        ("CO.json", "[3]", "has the wrong type"),
+        ("nonsense.json", [COLOR], "names no subtask"),
+        ("CO.jsonl", "{}", "holds no question files"),
+        ("CO.json", [{**COLOR, "options": ["red", "blue"]}], "are not four"),
+        ("CO.json", [{**COLOR, "answer": 2}], "has the wrong type"),
+    ],
+)
+def test_files_that_are_no_questions_are_said(tmp_path, towers, name, content, message):
+    write(tmp_path, name, content)
+    assert any(message in problem for problem in problems(tmp_path, towers))
+
+
+SPELLINGS = {
+    "claude-3-5-haiku-20241022": "Claude-3.5 Haiku",
+    "anthropic/claude-3-5-haiku@20241022": "Claude-3.5 Haiku",
+    "claude-3-5-sonnet-latest": "Claude-3.5 Sonnet",
+    "claude-3-7": "Claude-3.7 Sonnet",
+    "claude-3-7-sonnet-20250219-thinking": "Claude-3.7 Sonnet-Thinking",
+    "gpt4o": "GPT-4o",
+    "openai/gpt-4o-2024-08-06": "GPT-4o",
+    "gpt-4o-mini-2024-07-18": "GPT-4o-mini",
+    "o1-2024-12-17": "GPT-o1",
+    "o3": "GPT-o3",
+    "gemini-1.5-flash-002": "Gemini-1.5-flash",
+    "gemini-1.5-flash-8b-001": "Gemini-1.5-flash-8b",
+    "gemini-2.0-flash-lite-preview-02-05": "Gemini-2.0-flash-lite",
+    "gemini-2.0-flash-thinking-exp-1219": "Gemini-2.0-flash-thinking-exp",
+    "qwen-vl-max-2025-01-25": "Qwen-VL-Max",
+    "OpenGVLab/InternVL2_5-78B": "InternVL2.5-78B",
+    "Qwen2_5-VL-3B": "Qwen2.5-VL-3B-Instruct",
+    "llava-onevision-qwen2-7b-ov": "LLaVa-OneVision-7B",
+    "lmms-lab/llava-onevision-qwen2-0.5b-ov": "LLaVa-OneVision-0.5B",
+    "random": "Random",
+}
+OTHERS = [
+    *("", "/", "日本", "claude-3-5", "claude-3-5-thinking", "claude-4-sonnet", "gpt-4", "o1-mini"),
+    *("gpt-4o-audio-preview", "chatgpt-4o-latest", "gemini-2.0", "gemini-2.0-flash-exp"),
+    *("gemini-1.5-pro", "gemini-2.5-flash-lite", "gemini-2.0-flash-8b", "qwen2-vl-max"),
+    *("Qwen2.5-7B-Instruct", "Qwen2.5-VL-7B-Instruct-AWQ", "InternVL2-8B", "InternVL2_5-78B-MPO"),
+    *("llava-onevision-qwen2-7b-ov-chat", "llava-onevision-qwen2-72b-ov", "random-4"),
+]
+ROWS = [*dict.fromkeys([*published_table(1)["model"], *published_table(2)["model"]])]
+
+
+@pytest.mark.parametrize(("name", "published"), [*SPELLINGS.items(), *zip(ROWS, ROWS, strict=True)])
+def test_known_spellings(name, published):
+    assert match_published(name) == published
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_other_models_are_not_taken_for_published_ones(name):
+    assert match_published(name) is None
+
+
+names = st.sampled_from([*ROWS, *SPELLINGS])
+dates = st.dates(date(2020, 1, 1), date(2030, 12, 31))
+
+
+@given(
+    st.sampled_from(ROWS),
+    dates,
+    st.sampled_from(["%Y-%m-%d", "%Y%m%d", "%Y_%m_%d", "%m-%d", "%m%d"]),
+)
+def test_a_release_date_changes_nothing(name, day, form):
+    assert match_published(f"{name}-{day:{form}}") == name
+
+
+@given(names, st.data())
+def test_case_and_separators_change_nothing(name, data):
+    bare = name.rpartition("/")[2]
+    other = "".join(
+        data.draw(st.sampled_from("-_. "))
+        if char in "-_. "
+        else data.draw(st.sampled_from([char.lower(), char.upper()]))
+        for char in bare
+    )
+    assert match_published(other) == match_published(name)
+
+
+@given(names, st.from_regex(r"[a-z]{2,9}", fullmatch=True))
+def test_an_unknown_word_makes_it_another_model(name, word):
+    known = {"mini", "thinking", "lite", "latest", "preview", "exp", "instruct", "ov", "hf"}
+    if word not in known:
+        assert match_published(f"{name}-{word}") is None
+
+
+@given(st.text(max_size=40))
+def test_any_text_is_a_published_name_or_unknown(name):
+    assert match_published(name) in {None, *ROWS}

@@ -41,8 +41,8 @@ def write(folder, *questions):
 
 
 def read_one(folder, scenes, question):
-    (read,) = read_questions(write(folder, question), scenes).questions
-    return read
+    (task,) = read_questions(write(folder, question), scenes).tasks
+    return task
 
 
 def test_a_picture_is_the_scene_but_for_what_its_recipe_says(tmp_path, scenes):
@@ -58,15 +58,15 @@ def test_a_picture_is_the_scene_but_for_what_its_recipe_says(tmp_path, scenes):
         "framed": True,
     }
     asked = QUESTION | {"pictures": [recipe], "background": "lawn"}
-    question = read_one(tmp_path / "q", scenes, asked)
-    (picture,) = question.pictures
+    task = read_one(tmp_path / "q", scenes, asked)
+    (picture,) = task.question.pictures
     assert picture.background == "lawn"
     assert picture.blocks == (
         Block(2, "cuboid2", "green", (0, 0, 0.1), (0, 0, 45), (1,), 2),
         Block(9, "cube", "red", (0.2, 0, 0.025), (0, 0, 0), (), 1),
     )
     assert picture.marks == (Mark("A", (0, 0, 0.1)),)
-    assert picture.framed == question.scene.blocks
+    assert picture.framed == task.scene.blocks
 
 
 PICTURE_OPTIONS = ["<img1>", "<img2>", "<img3>", "<img4>"]
@@ -184,7 +184,20 @@ def test_the_digest_of_a_set_follows_every_field(tmp_path, scenes, field, value)
     assert digests[0] == digests[1] != digests[2]
 
 
-def test_complaints_of_one_line_are_bounded(tmp_path, scenes):
+def test_complaints_of_questions_about_another_data_set_and_of_one_line_are_bounded(
+    tmp_path, scenes
+):
+    others = [{**QUESTION, "id": f"co-{n}", "scene_id": f"far-{n}"} for n in range(30)]
+    folder = write(tmp_path / "q", QUESTION, *others)
+    with pytest.raises(DataError) as caught:
+        read_questions(folder, scenes)
+    (problem,) = caught.value.problems
+    assert "of another data set" in problem.message
+    assert "make questions about it" in problem.hint
+    # A few are told one by one.
+    with pytest.raises(DataError) as caught:
+        read_questions(write(tmp_path / "few", QUESTION, *others[:5]), scenes)
+    assert len(caught.value.problems) == 5
     question = copy.deepcopy(QUESTION)
     question["pictures"][0]["without"] = [9] * 20
     question.update({f"field{i}": [0] * 20 for i in range(5_000)})
@@ -195,7 +208,7 @@ def test_complaints_of_one_line_are_bounded(tmp_path, scenes):
 
 def test_a_whole_character_in_two_escapes_is_fine(tmp_path, scenes):
     text = "How many \U0001f9f1?"
-    assert read_one(tmp_path / "q", scenes, QUESTION | {"question": text}).text == text
+    assert read_one(tmp_path / "q", scenes, QUESTION | {"question": text}).question.text == text
 
 
 @settings(max_examples=40)
@@ -207,4 +220,4 @@ def test_any_question_is_read_or_refused(tmp_path_factory, line):
     with contextlib.suppress(DataError):
         questions = read_questions(folder, scenes)
         assert len(questions.sha256) == 64
-        assert all(question.text.encode() for question in questions.questions)
+        assert all(task.question.text.encode() for task in questions.tasks)

@@ -137,7 +137,7 @@ def test_pictures_that_were_changed_are_found_out(pictured):
 def test_lines_read_back_as_the_questions(static, tmp_path):
     folder = tmp_path / "q"
     write_questions(folder, static, SCENES, question_card("q", "phyblock-400", static, "command"))
-    assert list(read_questions(folder, DATA).questions) == static
+    assert [task.question for task in read_questions(folder, DATA).tasks] == static
     sums = (folder / "SHA256SUMS").read_text(encoding="utf-8").splitlines()
     assert [line.split("  ")[1] for line in sums] == ["CARD.md", "questions.jsonl", "VERSION"]
     with pytest.raises(StoreError, match="give another --out"):
@@ -169,7 +169,7 @@ def built_in():
 
 
 def test_the_built_in_set_is_whole_and_even(built_in):
-    asked = list(built_in.questions)
+    asked = [task.question for task in built_in.tasks]
     counts = {s: MAKERS[s].count for s in SUBTASKS}
     assert Counter(q.subtask for q in asked) == counts | {"AD": 45}
     assert not duplicates_of(asked)
@@ -191,7 +191,7 @@ def test_the_built_in_set_is_whole_and_even(built_in):
 
 @pytest.mark.parametrize("every", [37, pytest.param(1, marks=pytest.mark.slow)])
 def test_answers_of_the_built_in_set_are_derived_again(built_in, every):
-    asked = list(built_in.questions)
+    asked = [task.question for task in built_in.tasks]
     by_subtask = itertools.groupby(asked, lambda question: question.subtask)
     some = [question for _, of in by_subtask for question in list(of)[7 % every :: every]]
     assert {q.id: problem for q in some if (problem := problem_of(q))} == {}
@@ -200,7 +200,7 @@ def test_answers_of_the_built_in_set_are_derived_again(built_in, every):
 
 
 def test_places_that_no_mark_shows_are_found_out(built_in):
-    first = next(one for one in built_in.questions if one.subtask == "AD")
+    first = next(t.question for t in built_in.tasks if t.question.subtask == "AD")
     scene, block = first.pictures
     bare = replace(first, pictures=(replace(scene, marks=scene.marks[1:]), block))
     assert problem_of(bare) == "no place A is marked on a block"
@@ -240,7 +240,7 @@ def test_colors_of_a_question_are_told_apart_by_everybody(seen_as):
 def asked(tmp_path_factory, towers):
     folder = tmp_path_factory.mktemp("audited") / "questions"
     found = read_questions(write_asked(folder, asked_questions(per_subtask=8)), towers)
-    return list(found.questions)
+    return [task.question for task in found.tasks]
 
 
 def of(asked, subtask):

@@ -44,7 +44,7 @@ def test_shipped_scenes_and_questions_are_written_byte_for_byte():
     written = [StoredScene.of(task.scene, task.candidates).as_json() for task in TASKS]
     assert written == lines_of(SCENES)
     originals = {task.key: task.scene for task in TASKS}
-    asked = built_in_questions().questions
+    asked = (task.question for task in built_in_questions().tasks)
     written = [StoredQuestion.of(one, originals[one.scene.id]).as_json() for one in asked]
     assert written == lines_of(QUESTIONS)
 

@@ -103,7 +103,7 @@ def test_a_tsv_file_is_as_vlmevalkit_reads_it(question_set, towers, tmp_path):
     (file,) = write_vlmevalkit(out, asked_of, str(towers.root), None, 128)
     csv.field_size_limit(10**8)
     rows = csv_rows(file, delimiter="\t")
-    asked = {question.id: question for question in question_set.questions}
+    asked = {task.key: task.question for task in question_set.tasks}
     # Its multiple choice cannot score an order.
     choices = [key for key, question in asked.items() if len(question.answer) == 1]
     assert [row["index"] for row in rows] == choices
@@ -136,10 +136,10 @@ def test_a_hugging_face_dataset_has_questions_and_pictures(question_set, towers,
     parquet, _ = huggingface.write_questions(out, asked_of, str(towers.root), None, 128)
     cache = str(tmp_path / "cache")
     for rows in [datasets.load_dataset(str(parquet.parent), cache_dir=cache, split="test")]:
-        assert rows["id"][:] == [question.id for question in question_set.questions]
-        for row, question in zip(rows, question_set.questions, strict=True):
-            assert row["answer"] == question.answer_letters
-            assert row["options"] == list(question.options)
+        assert rows["id"][:] == [task.key for task in question_set.tasks]
+        for row, task in zip(rows, question_set.tasks, strict=True):
+            assert row["answer"] == task.question.answer_letters
+            assert row["options"] == list(task.question.options)
             assert [image.size for image in row["images"]] == [(128, 128)] * len(row["labels"])
 
 

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import pytest
 import yaml
+from PIL import Image as PillowImage
 
 from phyblock.data.questions import read_questions
 from phyblock.data.scenes import read_builtin
@@ -140,7 +141,7 @@ def pictures_of(workspace):
         pngs = {picture.label: question_png(picture, style) for picture in question.pictures}
         return {label: hashlib.sha256(png).hexdigest() for label, png in pngs.items()}
 
-    return {question.id: (question, digests(question)) for question in found.questions}
+    return {task.key: (task.question, digests(task.question)) for task in found.tasks}
 
 
 def shown(seen):
@@ -175,6 +176,37 @@ def test_pictures_arrive_in_order_each_with_its_caption(workspace):
             record["answer"]["given"] == record["answer"]["right"]
         )
         assert record["outcome"] == ("parse_failure" if question.subtask == "OR" else "ok")
+
+
+def test_pictures_of_official_files_are_sent_byte_for_byte(workspace):
+    folder = workspace.root / "questions"
+    folder.mkdir()
+    entry = {
+        "scene_id": "t1",
+        "question": "What comes next?",
+        "options": ["<img1>", "<img2>", "<img3>", "<img4>"],
+        "answer": "D",
+    }
+    (folder / "PD.json").write_text(json.dumps([entry]), encoding="utf-8")
+    digests = {}
+    for name in ("t1", *(f"pd-001/img{i}" for i in range(1, 5))):
+        path = folder / "images" / f"{name}.png"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        PillowImage.new("RGB", (40, 30), (8 * len(digests), 90, 120)).save(path)
+        digests[name] = hashlib.sha256(path.read_bytes()).hexdigest()
+    server = OpenAIChat(say=lambda _: "D")
+    with Running(server) as running:
+        workspace.write_models(running.url, "alpha", transport="direct")
+        fields = vqa_suite(format="official", circular=True)
+        workspace.write_suite(**{**fields, "models": ["alpha"]})
+        workspace.completed()
+    first, *others = digests.values()
+    sent = [tuple(digest for _, digest in shown(seen)) for seen in server.seen]
+    turned = {(first, *others[by:], *others[:by]) for by in range(4)}
+    assert len(sent) == len(turned) == 4
+    assert set(sent) == turned
+    right = {record["answer"]["right"] for record in workspace.records()}
+    assert right == set(LETTERS)
 
 
 def test_circular_and_blind_a_question_counts_once_and_only_if_all_rotations_are_right(workspace):

@@ -146,8 +146,8 @@ def test_no_built_in_picture_is_cut_open_and_blocks_of_wide_goals_are_large(ever
         places = np.array([one.position_m for one in task.scene.blocks])
         farthest_m = ((places - camera.eye_m) @ camera.axes[2]).max()
         assert 0.05 / camera.width_m(farthest_m) * style.size_px >= 0.08 * STYLE.size_px
-    for question in built_in_questions().questions[::every]:
-        for recipe in question.pictures:
+    for task in built_in_questions().tasks[::every]:
+        for recipe in task.question.pictures:
             assert lies_between_planes(drawn_blocks(recipe), question_camera(recipe, STYLE)), recipe
 
 

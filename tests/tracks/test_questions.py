@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.data.base import QuestionSet
+from phyblock.data.base import QuestionSet, QuestionTask
 from phyblock.domain.question import LETTERS, SUBTASKS, Question, rotated
 from phyblock.domain.scene import Scene
 from phyblock.models.request import Image
@@ -56,9 +56,9 @@ def images(request):
 def test_the_answer_stands_in_no_message(question_set, shop):
     """Questions that differ in the right answer alone are asked alike."""
     turned = []
-    for question in question_set.questions:
-        answer = tuple((index + 1) % 4 for index in question.answer)
-        turned.append(replace(question, answer=answer))
+    for task in question_set.tasks:
+        answer = tuple((index + 1) % 4 for index in task.question.answer)
+        turned.append(replace(task, question=replace(task.question, answer=answer)))
     rules = {"blind": True}
     asked = ask(opened(question_set, shop, **rules))
     again = ask(opened(QuestionSet("some", question_set.root, tuple(turned)), shop, **rules))
@@ -67,7 +67,7 @@ def test_the_answer_stands_in_no_message(question_set, shop):
 
 @given(first=st.integers(0, 3), second=st.integers(0, 3), data=st.data())
 def test_a_rotation_keeps_what_is_right_and_rotations_add_up(question_set, first, second, data):
-    question = data.draw(st.sampled_from(question_set.questions))
+    question = data.draw(st.sampled_from(question_set.tasks)).question
     turned = rotated(question, first)
     for before, after in zip(question.answer, turned.answer, strict=True):
         assert _meaning(turned, after) == _meaning(question, before)
@@ -88,7 +88,7 @@ def _meaning(question, index):
 
 
 def test_questions_keep_their_background_unless_a_suite_gives_one(question_set):
-    asked = next(one for one in question_set.questions if one.id == "vp-000")
+    asked = next(task.question for task in question_set.tasks if task.key == "vp-000")
     lawn = replace(asked, pictures=tuple(replace(p, background="lawn") for p in asked.pictures))
     bare = [replace(picture, background=None) for picture in asked.pictures]
     for question, ground, drawn in (
@@ -98,7 +98,7 @@ def test_questions_keep_their_background_unless_a_suite_gives_one(question_set):
         (asked, "white", "white"),
     ):
         style = replace(STYLE, background=drawn)
-        item = AskedQuestion(question)
+        item = AskedQuestion(QuestionTask(question))
         drawn = question_drawings(item, STYLE, ground)
         assert [one.key for one in drawn] == [question_key(picture, style) for picture in bare]
 
@@ -122,7 +122,8 @@ def test_random_answers_are_spread_over_all_that_can_be_given(question_set):
 
 def task_of(number, subtask):
     scene = Scene(f"s{number}", (number % 4 + 1,), (), ())
-    return Question(f"q{number}", subtask, scene, "?", ("a", "b", "c", "d"), (0,))
+    question = Question(f"q{number}", subtask, scene, "?", ("a", "b", "c", "d"), (0,))
+    return QuestionTask(question)
 
 
 tasks = st.lists(st.sampled_from(SUBTASKS[:4]), max_size=60).map(
@@ -134,8 +135,8 @@ some = st.lists(st.sampled_from(SUBTASKS[:7]), min_size=1, unique=True)
 @given(tasks, some, st.none() | st.integers(1, 40))
 def test_no_more_than_wanted_of_each_and_in_all(given_tasks, subtasks, limit):
     chosen = select_questions(given_tasks, subtasks, LEVELS, limit)
-    found = Counter(one.subtask for one in given_tasks)
-    counts = Counter(one.subtask for one in chosen)
+    found = Counter(one.question.subtask for one in given_tasks)
+    counts = Counter(one.question.subtask for one in chosen)
     most = {name: found[name] for name in subtasks}
     assert all(counts[name] <= most.get(name, 0) for name in SUBTASKS)
     assert len(chosen) == min(sum(most.values()), limit or sum(most.values()))
@@ -147,6 +148,6 @@ def test_no_more_than_wanted_of_each_and_in_all(given_tasks, subtasks, limit):
 def test_a_higher_limit_asks_all_that_a_lower_one_asks(given_tasks, subtasks, limit):
     def keys(most):
         kept = select_questions(given_tasks, subtasks, LEVELS, most)
-        return {question.id for question in kept}
+        return {one.key for one in kept}
 
     assert keys(limit) <= keys(limit + 1)

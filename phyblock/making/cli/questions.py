@@ -123,7 +123,7 @@ def verify(questions: str, data: str, jobs: int) -> None:
     """
     read = _read(questions, data)
     # Questions about one scene are processed together, so that pictures are shared.
-    asked = sorted(read.questions, key=lambda question: question.scene.id)
+    asked = sorted((task.question for task in read.tasks), key=lambda question: question.scene.id)
     problems = mapped(problem_of, asked, jobs, "Verifying")
     counts = Counter(question.subtask for question in asked)
     failed = Counter(q.subtask for q, p in zip(asked, problems, strict=True) if p)
@@ -150,7 +150,7 @@ def show(question: str, questions: str, data: str, out: Path | None) -> None:
     With --out, draw its pictures side by side, in the order of the recipe.
     """
     read = _read(questions, data)
-    by_id = {question.id: question for question in read.questions}
+    by_id = {task.question.id: task.question for task in read.tasks}
     if question not in by_id:
         hint = did_you_mean(question, by_id)
         raise DataError(Problem(str(read.root), "holds no such question", "", question, hint=hint))
@@ -195,7 +195,7 @@ def audit(questions: str, data: str) -> None:
     about base scenes that they did not learn from: the most frequent answer, the texts alone, and
     simple features of the pictures that are options. Exits with 0, whatever it finds.
     """
-    asked = list(_read(questions, data).questions)
+    asked = [task.question for task in _read(questions, data).tasks]
     subtasks = len({question.subtask for question in asked})
     audits = list(tracked(audit_questions(asked), subtasks, "Auditing"))
     rows = [
