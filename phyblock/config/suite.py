@@ -81,6 +81,37 @@ Seed = Annotated[int, Field(strict=True, ge=0, le=2**31 - 1)]
 Level = Annotated[int, Field(strict=True), OneOf(lambda: (1, 2, 3, 4, 5))]
 
 
+def _falling(value: tuple[float, float]) -> Iterator[Fault]:
+    if value[0] > value[1]:
+        yield Fault("begins above its end", "the least and the most, as in [23, 40]")
+
+
+Range = Annotated[tuple[float, float], checked(_falling)]
+"""The least and the most."""
+
+
+class DifficultySpec(Section):
+    """Ranges of difficulty measures, [least, most], that select scenes; null: any."""
+
+    blocks: Range | None = None
+    """Number of blocks."""
+    depth: Range | None = None
+    """Layers: the longest path of dependencies."""
+    orders: Range | None = None
+    """Decimal logarithm of a lower bound on the number of valid orders."""
+    blind: Range | None = None
+    """F1 in setting A, 0 to 1, of naming every candidate once."""
+    distractor: Range | None = None
+    """In how many of type, color and orientation the nearest distractor differs from a needed
+    block, on average: 1 to 3."""
+
+    @property
+    def ranges(self) -> dict[str, tuple[float, float]]:
+        """The ranges that are set."""
+        found = {name: getattr(self, name) for name in type(self).model_fields}
+        return {name: ends for name, ends in found.items() if ends is not None}
+
+
 class DatasetSpec(Section):
     """The scenes of a run."""
 
@@ -92,6 +123,8 @@ class DatasetSpec(Section):
     scenes.jsonl (write ./name for a folder beside the suite). official: the checkout's folder.
     Relative to the suite file, or to the working directory if given by --set; ~ and $VARIABLES are
     expanded."""
+    difficulty: DifficultySpec = DifficultySpec()
+    """Ranges of difficulty measures that select scenes."""
 
 
 class ImagesSpec(Section):
@@ -381,6 +414,9 @@ class Suite(Section):
             spec[name].sort()
         for section in ("dataset", *sections):
             spec.get(section, {}).pop("path", None)
+        spec["dataset"]["difficulty"] = self.dataset.difficulty.ranges
+        if not spec["dataset"]["difficulty"]:
+            del spec["dataset"]["difficulty"]
         for part in (spec, *(spec[key] for key in sections if key in spec)):
             if part.get("prompt", PROMPT_WORDS[0]) not in PROMPT_WORDS:
                 part["prompt"] = "template"

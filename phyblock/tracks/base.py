@@ -381,8 +381,12 @@ class SceneTrack(Track):
 def select_tasks(
     tasks: Sequence[AssemblyTask], suite: Suite, limit: int | None
 ) -> tuple[AssemblyTask, ...]:
-    """Return the tasks of a suite's levels, at most `limit`, in their order."""
+    """Return the tasks of a suite's levels and difficulty, at most `limit`, in their order."""
     chosen = [task for task in tasks if set(suite.levels) & set(task.scene.levels)]
+    if suite.dataset.difficulty.ranges:
+        from phyblock.tracks.difficulty import is_within  # Few suites need it.
+
+        chosen = [task for task in chosen if is_within(task, suite.dataset.difficulty)]
     return limited(chosen, [task.scene.level for task in chosen], limit)
 
 

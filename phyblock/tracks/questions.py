@@ -48,7 +48,7 @@ from phyblock.scoring.plan import chance
 from phyblock.sim.pictures import PictureStyle
 from phyblock.sim.question_pictures import question_key, question_png
 from phyblock.text import hex_digest
-from phyblock.tracks.base import Judgement, Track, limited
+from phyblock.tracks.base import Judgement, Track, limited, select_tasks
 from phyblock.tracks.measures import OVERALL, WHOLE, Cell, SampleCounts
 from phyblock.tracks.picking import Choice, Picking
 from phyblock.tracks.pictures import Drawing, picture_style
@@ -432,11 +432,13 @@ class Vqa(Track):
         self.questions = known = open_questions(
             spec.format, suite.files.folders[self.name], self.dataset
         )
-        tasks = select_questions(known.tasks, spec.subtasks, suite.levels, self.limit)
+        fitting = {one.key for one in select_tasks(self.dataset.tasks, suite, None)}
+        asked = [task for task in known.tasks if task.scene.id in fitting]
+        tasks = select_questions(asked, spec.subtasks, suite.levels, self.limit)
         if not tasks:
             where = suite.where("vqa", "subtasks")
             found = ", ".join(sorted({task.question.subtask for task in known.tasks}))
-            message = "no question is of these subtasks and levels"
+            message = "no question is of these subtasks, levels and difficulty"
             raise SpecError(Problem(where, message, "vqa.subtasks", found=f"questions of {found}"))
         self.items = tuple(
             AskedQuestion(task, rotation, is_one_of_many=spec.circular)

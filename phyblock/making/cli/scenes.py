@@ -83,6 +83,7 @@ from phyblock.sim.pictures import (
     visible_shares,
 )
 from phyblock.text import counted, hex_digest
+from phyblock.tracks.difficulty import MEASURES
 from phyblock.types import BACKGROUNDS
 from phyblock.workers import open_workers
 
@@ -343,6 +344,8 @@ def show(data: str, scene: str) -> None:
     size = f"{counted(len(shown), 'block')} · {counted(max(shown.graph.layers), 'layer')}"
     heading = f"scene {shown.id} · level {levels} · {size} · made from {parents}"
     console.print(heading, soft_wrap=True)
+    numbers = (f"{name} {measure(task):.3g}" for name, measure in MEASURES.items())
+    console.print(f"difficulty: {' · '.join(numbers)}", soft_wrap=True)
     seen = visible_shares(shown, PictureStyle())
     blocks = [
         (
