@@ -432,8 +432,10 @@ class Vqa(Track):
         self.questions = known = open_questions(
             spec.format, suite.files.folders[self.name], self.dataset
         )
-        fitting = {one.key for one in select_tasks(self.dataset.tasks, suite, None)}
-        asked = [task for task in known.tasks if task.scene.id in fitting]
+        asked = known.tasks
+        if suite.dataset.difficulty.ranges:
+            fitting = {one.key for one in select_tasks(self.dataset.tasks, suite, None)}
+            asked = tuple(task for task in known.tasks if task.scene.id in fitting)
         tasks = select_questions(asked, spec.subtasks, suite.levels, self.limit)
         if not tasks:
             where = suite.where("vqa", "subtasks")
