@@ -181,10 +181,13 @@ class Track(ABC):
     def open_prompt(self) -> Prompt:
         """Return the suite's own template, else the bundled one for its answer format.
 
-        Raises PromptError for a broken one.
+        Raises PromptError for a broken one, SpecError if the track has none for the format.
         """
-        path, bundled = self.suite.template(self.name), self.template_for(self.suite.answer_format)
-        assert bundled is not None, f"{self.name} has no prompt for {self.suite.answer_format}"
+        suite, field = self.suite, "answer_format"
+        path, bundled = suite.template(self.name), self.template_for(suite.answer_format)
+        if bundled is None:
+            message, hint = f"{self.name} cannot be asked for as JSON", "use answer_format: text"
+            raise SpecError(Problem(suite.where(field), message, field, "json_schema", hint=hint))
         return TemplatePrompt(path or bundled, "default" if path is None else path.stem)
 
     def shown(self, item: Any, _seed: int) -> Any:
@@ -474,15 +477,6 @@ def as_recorded(task: AssemblyTask, record: Record) -> AssemblyTask:
     return task if record.shown is None else in_order(task, record.shown.order)
 
 
-def file_plan(task: AssemblyTask, steps: Sequence[int]) -> tuple[int, ...] | None:
-    """Return steps in the numbers of the file, or None if the file's numbers were shown.
-
-    A number that no candidate has is kept: no candidate has it in the file either.
-    """
-    order = task.order
-    return tuple(order[n - 1] if 1 <= n <= len(order) else n for n in steps) if order else None
-
-
 kinds, kind_of = known_tracks, known_track
 """Lookups of all tracks by name, and of one."""
 
@@ -497,9 +491,4 @@ def open_tracks(
     suite: Suite, dataset: Dataset, limit: int | None = None, shop: Workshop | None = None
 ) -> tuple[Track, ...]:
     """Return the tracks of a suite, in its order; raises as `Track`."""
-    for name in suite.tracks:
-        kind, field = kind_of(name), "answer_format"
-        if kind.template_for(suite.answer_format) is None:
-            message, hint = f"{name} cannot be asked for as JSON", "use answer_format: text"
-            raise SpecError(Problem(suite.where(field), message, field, "json_schema", hint=hint))
     return tuple(kind_of(name)(suite, dataset, limit, shop) for name in suite.tracks)

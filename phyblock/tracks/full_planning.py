@@ -15,10 +15,10 @@ from phyblock.domain.scene import AssemblyTask, Block, CandidateSet, Kind, Plan,
 from phyblock.errors import DataError, Problem, SpecError
 from phyblock.files import bundled
 from phyblock.parsing.plan import ParsedPlan, parse_plan, plan_form
-from phyblock.parsing.text import READER_VERSION, AnswerForm
+from phyblock.parsing.text import AnswerForm
 from phyblock.records.record import Line, Record, Score
 from phyblock.scoring.plan import BLOCK_OUTCOMES, ERROR_TYPES, AssemblyScorer, Counts
-from phyblock.tracks.base import Judgement, SceneTrack, file_plan
+from phyblock.tracks.base import Judgement, SceneTrack
 from phyblock.tracks.goal_blind import blind_guesses
 from phyblock.tracks.measures import SampleCounts, level_cells
 from phyblock.tracks.picking import Picking, candidate_choices
@@ -38,12 +38,8 @@ class PlanParse(Line):
     """The rule that matched; null: nothing could be parsed."""
     plan: tuple[int, ...]
     """Candidate numbers in order, as shown to the model."""
-    file_plan: tuple[int, ...] | None = None
-    """The same in the numbers of the file; null: they are the numbers shown."""
     dropped: tuple[int, ...] = ()
     """Numbers that no candidate has."""
-    version: int = 1
-    """Version of the parser."""
     problem: str | None = None
     """Reason why nothing could be parsed."""
     truncated: bool = False
@@ -254,9 +250,7 @@ class FullPlanning(SceneTrack):
         scores = self._scorers[key].score(parsed.plan, suite.scoring.matchers, level1)
         parse = {
             "parser": suite.parser,
-            "version": 1 if suite.parser == "official" else READER_VERSION,
             "plan": parsed.plan.steps,
-            "file_plan": file_plan(item, parsed.plan.steps),
             **{n: getattr(parsed, n) for n in ("rule", "dropped", "problem", "truncated")},
         }
         fields = {"parse": parse, "scores": list(map(vars, scores))}

@@ -23,7 +23,7 @@ from phyblock.parsing.poses import (
     parse_poses,
     pose_form,
 )
-from phyblock.parsing.text import READER_VERSION, AnswerForm
+from phyblock.parsing.text import AnswerForm
 from phyblock.records.record import Amount, Course, Line, Record, Whole
 from phyblock.scoring.plan import AssemblyScorer
 from phyblock.scoring.pose import (
@@ -45,7 +45,7 @@ from phyblock.sim.geometry import box_height_cm, center_cm, collision_pieces, or
 from phyblock.sim.pictures import goal_style
 from phyblock.sim.ruled import kit_key, kit_png, ruled_key, ruled_png, written_style
 from phyblock.text import plain_sum
-from phyblock.tracks.base import CARRYING, ENGINE, Judgement, SceneTrack, file_plan
+from phyblock.tracks.base import CARRYING, ENGINE, Judgement, SceneTrack
 from phyblock.tracks.full_planning import PlanParse, PlanSubject, needed_candidate
 from phyblock.tracks.measures import SampleCounts, level_cells
 from phyblock.tracks.picking import NumberField, Pick, Picking, candidate_choices
@@ -227,9 +227,7 @@ def judge_poses(
         "parser": "poses",
         "rule": parsed.rule,
         "plan": plan,
-        "file_plan": file_plan(item, plan),
         "dropped": [number for number in numbers if not 1 <= number <= n],
-        "version": READER_VERSION,
         "problem": parsed.problem,
         "steps": [{"block": step.candidate, "center_cm": step.center_cm} for step in given],
     }

@@ -15,13 +15,7 @@ import numpy as np
 from pydantic import Field
 
 from phyblock.config.suite import Suite
-from phyblock.config.validation import (
-    Flag,
-    PictureControls,
-    SubtaskName,
-    TemplateName,
-    UniqueSome,
-)
+from phyblock.config.validation import Flag, PictureControls, SubtaskName, TemplateName, UniqueSome
 from phyblock.data.base import Dataset, QuestionSet, QuestionTask
 from phyblock.data.official import read_official_questions
 from phyblock.data.questions import QUESTIONS_FILE, read_questions
@@ -226,7 +220,7 @@ COUNTS = (
 
 def _guessing(suite: Suite, cell: str) -> float:
     """Return the expected accuracy of uniform guesses in a subtask."""
-    subtask = next(name for name in SUBTASKS if name == cell)
+    (subtask,) = (name for name in SUBTASKS if name == cell)
     return chance(subtask) ** suite.section(VqaSpec).rotations
 
 
@@ -275,21 +269,17 @@ class Folds:
         return [question for question in mine if self.is_known(fold, question)]
 
 
-class Guesses:
-    """Guesses at questions of a set, or at rotations of them, by rules that `learn` returns."""
+def guesses_of(questions: Sequence[Question], learn: Callable[[Sequence[Question]], Rule]) -> Rule:
+    """Return the rule that answers questions of a set, or rotations of them, by the rules that
+    `learn` returns for questions about other scenes.
+    """
+    folds = Folds(questions)
 
-    def __init__(
-        self, questions: Sequence[Question], learn: Callable[[Sequence[Question]], Rule]
-    ) -> None:
-        self._folds, self._learn = Folds(questions), learn
-        self._rules: dict[tuple[Subtask, int], Rule] = {}
+    @functools.cache
+    def learned(subtask: Subtask, fold: int) -> Rule:
+        return learn(folds.known(fold, subtask))
 
-    def guess(self, question: Question) -> tuple[int, ...]:
-        """Return the guess of the rule that was learned from questions about other scenes."""
-        name = (question.subtask, self._folds.of(question))
-        if name not in self._rules:
-            self._rules[name] = self._learn(self._folds.known(name[1], question.subtask))
-        return self._rules[name](question)
+    return lambda question: learned(question.subtask, folds.of(question))(question)
 
 
 def majority_rule(known: Sequence[Question]) -> Rule:
@@ -447,7 +437,7 @@ class Vqa(Track):
             for task in tasks
             for rotation in range(spec.rotations)
         )
-        self._guesses = Guesses([task.question for task in known.tasks], majority_rule)
+        self._guess = guesses_of([task.question for task in known.tasks], majority_rule)
 
     def draw(self, item: AskedQuestion) -> tuple[Drawing, ...]:
         """Return the pictures of a question in the style of the suite."""
@@ -490,8 +480,7 @@ class Vqa(Track):
 
     def subject_of(self, item: AskedQuestion) -> ChoiceSubject:
         """Return the subject of baselines."""
-        question = item.question
-        return ChoiceSubject(question, lambda: self._guesses.guess(question))
+        return ChoiceSubject(item.question, lambda: self._guess(item.question))
 
     def judge(self, item: AskedQuestion, text: str | None) -> Judgement:
         """Parse and score a reply; a missing reply (None) is no answer."""

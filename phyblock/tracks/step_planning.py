@@ -24,7 +24,7 @@ from phyblock.sim.dynamics import DEFAULT_TRIAL, ONE_SETTING, settle
 from phyblock.sim.engine import described_engine
 from phyblock.sim.pictures import goal_style
 from phyblock.sim.question_pictures import question_key, question_png, state_picture
-from phyblock.tracks.base import ENGINE, Judgement, SceneTrack, file_plan
+from phyblock.tracks.base import ENGINE, Judgement, SceneTrack
 from phyblock.tracks.full_planning import POSE_COUNTS, PlanParse, PlanSubject
 from phyblock.tracks.goal_blind import blind_guesses
 from phyblock.tracks.measures import SampleCounts
@@ -37,13 +37,7 @@ Feedback = Literal["none", "success", "error_type"]
 StepOutcome = MoveOutcome | Literal["done"] | MoveProblem
 """Outcome of a step; a MoveProblem is a reply without a single parsed operation."""
 Ending = Literal[
-    "completed",
-    "done",
-    "collapsed",
-    "max_steps",
-    "max_failures",
-    "max_repeats",
-    "unanswered",
+    "completed", "done", "collapsed", "max_steps", "max_failures", "max_repeats", "unanswered"
 ]
 ENDINGS: tuple[Ending, ...] = get_args(Ending)
 
@@ -494,10 +488,9 @@ class StepEpisode:
         """Return the fields of the episode; it is parsed if any operation was."""
         outcomes = [turn["outcome"] for turn in self._turns]
         plan = [step.move for step in self._past() if step.move is not None]
-        parse = {"parser": "move", "rule": None, "plan": plan}
         settings = self._track.suite.settings
         fields = {
-            "parse": {**parse, "file_plan": file_plan(self._task, plan), "dropped": []},
+            "parse": {"parser": "move", "rule": None, "plan": plan, "dropped": []},
             "scores": [one for setting in settings for one in self._scores(setting, len(plan))],
             "ending": self.ending or "unanswered",
             "outcomes": outcomes,

@@ -33,7 +33,7 @@ from phyblock.tracks.questions import (
     FOLDS,
     ChoiceSubject,
     Folds,
-    Guesses,
+    guesses_of,
     majority_rule,
     pick_answer,
 )
@@ -87,8 +87,8 @@ LEARNERS = (majority_rule, text_rule)
 
 
 def accuracy(learn, questions):
-    guesses = Guesses(questions, learn)
-    return sum(guesses.guess(one) == one.answer for one in questions) / len(questions)
+    guesses = guesses_of(questions, learn)
+    return sum(guesses(one) == one.answer for one in questions) / len(questions)
 
 
 @pytest.mark.parametrize("learn", LEARNERS)
@@ -128,9 +128,9 @@ def test_letters_of_pictures_and_orders_go_by_frequency():
     questions = [question(n, pictures, (2,) if n % 3 else (0,)) for n in range(60)]
     orders = [question(n, pictures, (3, 1, 0, 2), "OR") for n in range(20)]
     for learn in LEARNERS:
-        guesses = Guesses([*questions, *orders], learn)
-        assert {guesses.guess(one) for one in questions} == {(2,)}
-        assert {guesses.guess(one) for one in orders} == {(3, 1, 0, 2)}
+        guesses = guesses_of([*questions, *orders], learn)
+        assert {guesses(one) for one in questions} == {(2,)}
+        assert {guesses(one) for one in orders} == {(3, 1, 0, 2)}
 
 
 KIT = tuple(Candidate(*kind, (0.0, 0.0, 0.0)) for kind in KIT_PALETTE)

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from phyblock.domain.scene import AOVGraph, Candidate, CandidateSet
 from phyblock.errors import DataError
 from phyblock.records.record import Reply
-from phyblock.tracks.base import fair_order, file_plan, in_order, presented, shown_order, spread
+from phyblock.tracks.base import fair_order, in_order, presented, shown_order, spread
 from phyblock.tracks.difficulty import MEASURES, distractor_distance, log_orders
 from tests.shipped import TASKS
 from tests.tracks.conftest import track_of
@@ -74,17 +74,21 @@ def test_orders_stay_as_they_were_drawn(tasks):
             in_order(tasks[0], order)
 
 
+def in_file(task, steps):
+    """Steps in the numbers of the file; a number that no candidate has is kept."""
+    return [task.order[n - 1] if 1 <= n <= len(task.order) else n for n in steps]
+
+
 @given(st.integers(0, 4), seeds, plans)
 def test_a_plan_is_worth_the_same_in_either_numbering(tasks, place, seed, plan):
     task, track = tasks[place], _track("full_planning")
     shown = presented(task, seed, "shuffled")
     here = track.judge(shown, plan_text(*plan)).fields
-    in_file = here["parse"]["file_plan"]
-    again = track.judge(task, plan_text(*in_file)).fields
+    meant = in_file(shown, here["parse"]["plan"])
+    again = track.judge(task, plan_text(*meant)).fields
     assert here["scores"] == again["scores"]
-    assert again["parse"]["file_plan"] is None
     named = [shown.candidates[n] for n in here["parse"]["plan"]]
-    assert named == [task.candidates[n] for n in in_file]
+    assert named == [task.candidates[n] for n in meant]
 
 
 _TRACKS = {}
@@ -109,15 +113,14 @@ def test_an_episode_goes_the_same_in_either_numbering(tasks, place, seed, moves)
 
     shown = presented(tasks[place], seed, "shuffled")
     here = asyncio.run(play(shown, moves))
-    there = asyncio.run(play(tasks[place], file_plan(shown, moves)))
+    there = asyncio.run(play(tasks[place], in_file(shown, moves)))
     for name in ("scores", "outcomes", "ending"):
         assert here[name] == there[name]
-    assert list(here["parse"]["file_plan"]) == there["parse"]["plan"]
+    assert in_file(shown, here["parse"]["plan"]) == there["parse"]["plan"]
 
 
 def test_a_plain_presentation_changes_nothing(tasks):
     assert all(presented(task, 5, "file") is task for task in tasks)
-    assert file_plan(tasks[0], [1, 2]) is None
     assert track_of("full_planning", tasks, seeds=[0, 1]).about(tasks[0]) == {}
 
 

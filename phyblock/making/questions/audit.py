@@ -23,7 +23,7 @@ from phyblock.making.questions.base import Floats
 from phyblock.making.questions.measures import measures_of
 from phyblock.making.questions.production import BALANCE
 from phyblock.making.questions.text_probe import text_rule
-from phyblock.tracks.questions import FOLDS, Folds, Guesses, majority_rule
+from phyblock.tracks.questions import FOLDS, Folds, guesses_of, majority_rule
 
 GUESSABLE = 0.35
 """Accuracy that no probe of a sound set exceeds, unless chance is within its interval."""
@@ -85,7 +85,8 @@ def audit_questions(questions: Sequence[Question]) -> Iterator[SubtaskAudit]:
     Raises SpecError where scikit-learn, which the text probe uses, is not installed.
     """
     folds = Folds(questions)
-    readers = {"majority": Guesses(questions, majority_rule), "text": Guesses(questions, text_rule)}
+    rules = {"majority": majority_rule, "text": text_rule}
+    readers = {name: guesses_of(questions, rule) for name, rule in rules.items()}
     repeated = duplicates_of(questions)
     for subtask in SUBTASKS:
         mine = [question for question in questions if question.subtask == subtask]
@@ -93,7 +94,7 @@ def audit_questions(questions: Sequence[Question]) -> Iterator[SubtaskAudit]:
             continue
         n, first = len(mine), Counter(question.answer[0] for question in mine)
         probes = {
-            name: Probe(sum(guesses.guess(q) == q.answer for q in mine), n)
+            name: Probe(sum(guesses(q) == q.answer for q in mine), n)
             for name, guesses in readers.items()
         }
         by_kind = picture_probe(mine, folds)

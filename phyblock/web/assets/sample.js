@@ -175,7 +175,7 @@ const Sample = (() => {
   // ---- the reply
 
   /** Fields that say how a reply was read, not what was read in it. */
-  const HOW_READ = ["rule", "parser", "version", "problem", "dropped", "file_plan", "letters", "move", "plan"];
+  const HOW_READ = ["rule", "parser", "problem", "dropped", "letters", "move", "plan"];
 
   /** The cards of a reply: the answer and whether it is right, the text, facts of the call. */
   function said({ record, outcome }) {
