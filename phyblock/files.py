@@ -277,7 +277,7 @@ def append_whole(number: int, data: bytes, *, sync: bool = False) -> None:
 _KIND_BYTES = 4
 
 
-def write_named(path: Path, data: bytes | str | Iterable[bytes]) -> None:
+def write_named(path: Path, data: bytes | Iterable[bytes]) -> None:
     """Write a file that the user named, replacing one of its kind, and create its folders.
 
     A file is of its kind if it is empty or begins with the same four bytes, as ZIP archives, GIFs
@@ -285,25 +285,22 @@ def write_named(path: Path, data: bytes | str | Iterable[bytes]) -> None:
     StoreError if the disk fails, and if anything else is there: to replace a device would take it
     from the whole machine.
     """
-    whole = data.encode("utf-8", "replace") if isinstance(data, str) else data
-    pieces = iter([whole] if isinstance(whole, bytes) else whole)
+    pieces = iter([data] if isinstance(data, bytes) else data)
     first = next(pieces, b"")
     with writing(path):
         target = Path(os.path.realpath(path))
-        if target.exists():
-            is_regular, what = stat.S_ISREG(target.stat().st_mode), "a file of another kind"
-            if not is_regular:
-                what = "a folder" if target.is_dir() else "not a regular file"
-            if not is_regular or _begins(target) not in (b"", first[:_KIND_BYTES]):
-                hint = "name another file, or move it away"
-                raise StoreError(Problem(str(path), f"cannot be written: it is {what}", hint=hint))
+        try:
+            with open_regular(target) as file:
+                is_of_its_kind = file.read(_KIND_BYTES) in (b"", first[:_KIND_BYTES])
+        except (NotRegularError, IsADirectoryError):
+            is_of_its_kind = False
+        except FileNotFoundError:
+            is_of_its_kind = True
+        if not is_of_its_kind:
+            message, hint = "is there, and of another kind", "name another file, or move it away"
+            raise StoreError(Problem(str(path), f"cannot be written: it {message}", hint=hint))
         target.parent.mkdir(parents=True, exist_ok=True)
         atomic_write(target, itertools.chain([first], pieces))
-
-
-def _begins(path: Path) -> bytes:
-    with path.open("rb") as file:
-        return file.read(_KIND_BYTES)
 
 
 LIST = ".generated"

@@ -59,19 +59,9 @@ def _names_of(kind: type[Track]) -> set[str]:
     return {kind.name, kind.section} - {""}
 
 
-def unregister_track(name: str) -> None:
-    """Remove an added track. Raises KeyError for any other."""
-    del _registered[name]
-
-
 def add_measure(track: str, measure: Any) -> None:
     """Add a `tracks.measures.Measure` to a track. Raises KeyError for an unknown track."""
     _measures[known_track(track).name] = (*added_measures(track), measure)
-
-
-def remove_measure(track: str, name: str) -> None:
-    """Remove an added measure."""
-    _measures[track] = tuple(one for one in added_measures(track) if one.name != name)
 
 
 def added_measures(track: str) -> tuple[Any, ...]:

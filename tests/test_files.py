@@ -61,8 +61,8 @@ def test_what_the_disk_refuses_is_one_of_our_errors(tmp_path):
 
 def test_a_named_file_is_written_through_the_link_that_a_person_made(tmp_path):
     (tmp_path / "link").symlink_to(tmp_path / "target")
-    write_named(tmp_path / "link", "text")
-    write_named(tmp_path / "deep" / "file", "text")
+    write_named(tmp_path / "link", b"text")
+    write_named(tmp_path / "deep" / "file", b"text")
     assert (tmp_path / "link").is_symlink()
     assert (tmp_path / "target").read_text() == (tmp_path / "deep" / "file").read_text() == "text"
 
@@ -72,7 +72,7 @@ def test_a_named_file_replaces_one_of_its_kind_and_no_other(tmp_path):
     for before in (b"", b"GIF89a old", b"notes", b"GI"):
         path.write_bytes(before)
         if before in (b"notes", b"GI"):
-            with pytest.raises(StoreError, match="a file of another kind"):
+            with pytest.raises(StoreError, match="of another kind"):
                 write_named(path, b"GIF89a new")
             assert path.read_bytes() == before
         else:
@@ -82,9 +82,9 @@ def test_a_named_file_replaces_one_of_its_kind_and_no_other(tmp_path):
 
 def test_a_device_is_never_replaced(tmp_path):
     os.mkfifo(tmp_path / "pipe")
-    for path, said in ((tmp_path / "pipe", "not a regular file"), (tmp_path, "a folder")):
-        with pytest.raises(StoreError, match=said):
-            write_named(path, "text")
+    for path in (tmp_path / "pipe", tmp_path):
+        with pytest.raises(StoreError, match="of another kind"):
+            write_named(path, b"text")
     assert list(tmp_path.iterdir()) == [tmp_path / "pipe"]
     assert (tmp_path / "pipe").is_fifo()
 

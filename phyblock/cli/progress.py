@@ -189,11 +189,6 @@ class ProgressView:
         done = sum(int(tally.task.completed) for tally in tallies)
         total = sum(int(tally.task.total or 0) for tally in tallies)
         text = f"{done:,} of {counted(total, 'sample')} after {_duration(now_s - self._started_s)}"
-        # The slowest model determines the remaining time.
-        left_s = [tally.task.time_remaining for tally in tallies if not tally.task.finished]
-        known_s = [seconds for seconds in left_s if seconds is not None]
-        if known_s and len(known_s) == len(left_s):
-            text += f", about {_duration(max(known_s))} left"
         failures = sum((tally.failures for tally in tallies), Counter[str]())
         numbers = {name.replace("_", " "): n for name, n in sorted(failures.items())}
         numbers["sent again"] = sum(tally.retries for tally in tallies)

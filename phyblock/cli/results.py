@@ -72,11 +72,7 @@ def report(
         _check_names(run, names, table_names(loaded), "table")
         tables = make_tables(loaded, names or table_names(loaded))
     if not tables:
-        is_other = loaded.design.suite.dataset.format != "official"
-        others = "The paper's tables are about the official scenes; this run used others."
-        console.print(
-            others if is_other else "No model of the run has a row in the paper's tables."
-        )
+        console.print("No model of the run has a row in the paper's tables for these scenes.")
     for name, table in tables.items():
         if form == "text":
             print_table(console, table)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shlex
-from collections.abc import Sequence
 from pathlib import Path
 
 import click
@@ -19,10 +18,8 @@ from phyblock.cli.console import (
     shown_path,
 )
 from phyblock.config.models import (
-    GROUP,
     RECORDED,
     ModelConfig,
-    group_names,
     load_models,
     with_members,
 )
@@ -148,31 +145,25 @@ def _check(path: Path, sets: tuple[str, ...], models_file: str | None) -> str:
 @click.command()
 @models_file_option
 def models(models_file: str | None) -> None:
-    """List the models that suites may name, by groups."""
+    """List the models that suites may name."""
     from phyblock.models.costs import tariff_of
     from phyblock.models.keys import api_key_status
 
     path = find_models_file(models_file, None)
     known = load_models(path)
     console = make_console()
-    groups: dict[str, Sequence[str]] = {"built in": baseline_names()}
-    groups |= {
-        f"{GROUP}{one}": with_members([f"{GROUP}{one}"], known) for one in group_names(known)
-    }
-    if others := [name for name, config in known.items() if not config.groups]:
-        groups["in no group" if len(others) < len(known) else "models"] = others
-    for title, names in groups.items():
-        rows: list[tuple[str, ...]] = []
-        suite = Suite(name="models", models=("random",))
-        for name in names:
-            config = to_config(name, known.get(name, ModelConfig(name=name)), suite)
-            if config.kind != "litellm":
-                rows.append((name, str(config.recording or config.kind), "", "0, 0"))
-                continue
-            status, tariff = api_key_status(config), tariff_of(config)
-            key = f"needs {status.variables[0]}" if status.is_needed else "not needed"
-            key = "cannot be sent" if status.fault else "set" if status.is_set else key
-            price = f"{tariff.input:.10g}, {tariff.output:.10g}" if tariff else "unknown"
-            rows.append((name, config.id, key, price))
-        print_rows(console, (title, "id", "key", "$/M in, out"), rows, numbers=1)
+    rows: list[tuple[str, ...]] = []
+    suite = Suite(name="models", models=("random",))
+    for name in (*baseline_names(), *known):
+        config = to_config(name, known.get(name, ModelConfig(name=name)), suite)
+        groups = ", ".join(config.groups)
+        if config.kind != "litellm":
+            rows.append((name, groups, str(config.recording or config.kind), "", "0, 0"))
+            continue
+        status, tariff = api_key_status(config), tariff_of(config)
+        key = f"needs {status.variables[0]}" if status.is_needed else "not needed"
+        key = "cannot be sent" if status.fault else "set" if status.is_set else key
+        price = f"{tariff.input:.10g}, {tariff.output:.10g}" if tariff else "unknown"
+        rows.append((name, groups, config.id, key, price))
+    print_rows(console, ("model", "groups", "id", "key", "$/M in, out"), rows, numbers=1)
     console.print(f"{counted(len(known), 'model')} in {shown_path(path)}")

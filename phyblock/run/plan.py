@@ -326,17 +326,18 @@ def bundled_suites() -> list[str]:
 def find_suite(name: str) -> Path:
     """Return the suite file that `name` means: a path, or the name of a bundled suite.
 
-    Raises SpecError, listing the bundled suites, if there is no such file, or it is a prompt.
+    Raises SpecError, listing the bundled suites, if there is no such file.
     """
     path, suites = Path(name), bundled_suites()
-    is_prompt = path.suffix == ".j2"
-    if os.path.isfile(path) and not is_prompt:
+    if os.path.isfile(path):
         return path
     if name.removesuffix(".yaml") in suites:
         return bundled("benchmarks", f"{path.stem}.yaml")
-    message = "is a prompt, not a suite" if is_prompt else "there is no such suite file"
-    hint = "name the suite that uses it" if is_prompt else did_you_mean(path.stem, suites)
-    allowed = "a suite file, or a bundled suite: " + ", ".join(suites)
+    allowed, hint = (
+        f"a suite file, or a bundled suite: {', '.join(suites)}",
+        did_you_mean(path.stem, suites),
+    )
+    message = "there is no such suite file"
     raise SpecError(Problem(name or "suite", message, allowed=allowed, hint=hint))
 
 

@@ -106,11 +106,6 @@ def template(text):
     return prepare
 
 
-def template_alone(verb):
-    """A template stands where a suite belongs."""
-    return file("mine.j2", user_block("Build it."), verb, "mine.j2")
-
-
 def user_block(text):
     """A template whose second line is `text`, in a user block."""
     return f"{{% block user %}}\n{text}\n{{% endblock %}}"
@@ -296,8 +291,6 @@ OPTIONS = (
         command("--plugin", "no_such", "models"),
         ("--plugin: cannot be imported: ModuleNotFoundError",),
     ),
-    Bad("prompt-run", template_alone("run"), ("mine.j2: is a prompt, not a suite", "hint: name")),
-    Bad("prompt-validate", template_alone("validate"), ("mine.j2: is a prompt, not a suite",)),
     Bad("models", options("--models", "oracel"), ("--models", "found: oracel", "mean oracle?")),
     Bad("no-file", options("--models-file", "gone.yaml"), ("gone.yaml", "no such models file")),
     Bad("limit", options("--limit", "0"), ("--limit", "0 is not in the range")),

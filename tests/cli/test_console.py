@@ -141,13 +141,3 @@ def test_before_anything_is_asked_scenes_are_being_prepared():
     lines = logged((12.0, None), (23.0, done()))
     assert lines[0] == "Preparing scenes ... (12 s)"
     assert lines[1].startswith("1 of 10 samples after 23 s")
-
-
-def test_no_time_is_told_before_every_model_has_given_answers():
-    """Two models of 100 samples: alpha answers every second, beta every ten from 100 s on."""
-    events = [(float(second), done("alpha")) for second in range(1, 101)]
-    events += [(100.0 + 10 * n, done("beta")) for n in range(1, 31)]
-    lines = logged(*events, models=("alpha", "beta"), expected=100)
-    told = [line for line in lines if " left" in line]
-    assert told[0] == "102 of 200 samples after 2 min 00 s, about 16 min 20 s left"
-    assert "101 of 200 samples after 1 min 50 s" in lines

@@ -53,15 +53,8 @@ LATER = ("blocks", "kept")
 @pytest.fixture
 def add():
     """Adds measures to tracks; they are gone after the test."""
-    added = []
-
-    def add(track, measure):
-        registry.add_measure(track, measure)
-        added.append((track, measure))
-
-    yield add
-    for track, measure in added:
-        registry.remove_measure(track, measure.name)
+    yield registry.add_measure
+    registry._measures.clear()
 
 
 @pytest.fixture
@@ -179,11 +172,11 @@ def run(here):
     here.write_suite(tracks=["counting"], models=["oracle", "random"])
     assert not call("run", "suite.yaml", "--out", "out", "--no-report")
     yield load_run(here.out)
-    registry.unregister_track(Counting.name)
+    registry._registered.pop(Counting.name)
 
 
 def show(kind):
-    registry.unregister_track(Counting.name)
+    registry._registered.pop(Counting.name)
     registry.register_track(kind)
 
 
