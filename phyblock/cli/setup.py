@@ -146,8 +146,8 @@ def _check(path: Path, sets: tuple[str, ...], models_file: str | None) -> str:
 @models_file_option
 def models(models_file: str | None) -> None:
     """List the models that suites may name."""
+    from phyblock.models.client import api_key_status
     from phyblock.models.costs import tariff_of
-    from phyblock.models.keys import api_key_status
 
     path = find_models_file(models_file, None)
     known = load_models(path)
@@ -162,7 +162,7 @@ def models(models_file: str | None) -> None:
             continue
         status, tariff = api_key_status(config), tariff_of(config)
         key = f"needs {status.variables[0]}" if status.is_needed else "not needed"
-        key = "cannot be sent" if status.fault else "set" if status.is_set else key
+        key = "set" if status.key else key
         price = f"{tariff.input:.10g}, {tariff.output:.10g}" if tariff else "unknown"
         rows.append((name, groups, config.id, key, price))
     print_rows(console, ("model", "groups", "id", "key", "$/M in, out"), rows, numbers=1)

@@ -23,7 +23,7 @@ from phyblock.files import atomic_write, load_json, writing
 from phyblock.models.batch_providers import PROVIDERS, UNREADABLE, BatchProvider, BatchStatus
 from phyblock.models.cache import ReplyCache, reply_key
 from phyblock.models.client import Answer, Client, HttpClient
-from phyblock.models.costs import ModelBudget, cost_usd, counted, estimate, may_be_billed
+from phyblock.models.costs import ModelBudget, Reservation, cost_usd, estimate, may_be_billed
 from phyblock.models.model import ModelEvent, Report, RetryPolicy
 from phyblock.models.request import Request
 from phyblock.records.files import BATCHES
@@ -72,7 +72,7 @@ class Batch:
     created: datetime = field(default_factory=lambda: datetime.now(UTC))
     event: BatchEvent | None = None
     id: str = ""
-    held: dict[str, int] = field(default_factory=dict)
+    held: dict[str, Reservation] = field(default_factory=dict)
     unheld: set[str] = field(default_factory=set)
     lines: list[bytes] = field(default_factory=list)
     size_bytes: int = 0
@@ -133,7 +133,7 @@ class BatchModel:
         for batch in self._batches:
             batch.unheld = set(batch.most_usd)
         self._ended_before = [batch for batch in self._batches if batch.event == "ended"]
-        # By request: the batch or draft that holds it and in which it has not failed.
+        # By request: the batch or draft that holds it.
         self._newest = {key: batch for batch in self._batches for key in batch.most_usd}
         self._asked = 0
         self._adding = asyncio.Lock()
@@ -144,62 +144,57 @@ class BatchModel:
             if batch.event == "intended":
                 self._refusal = self._unsure(batch, "the command ended meanwhile")
         self._given: set[str] = set()
-        self._billed_usd: dict[str, float] = {}
 
     async def ask(self, request: Request) -> Reply:
         """Return the cached reply, or the answer of the newest batch with the request.
 
-        Raises as `Model.ask`. When cancelled, it gives up, and the batch continues.
+        Raises as `Model.ask`; a request that failed in a batch is sent again by the next command.
+        When cancelled, it gives up, and the batch continues.
         """
-        key, failures = reply_key(self.config, request), 0
+        key = reply_key(self.config, request)
         self._asked += 1
-        while True:
-            if (batch := self._newest.get(key)) is None:
-                if self.cache is not None and (kept := self.cache.get(key)) is not None:
-                    return kept.model_copy(update={"cost_usd": cost_usd(self.budget.tariff, kept)})
-                async with self._adding:
-                    # Another sample may have sent the same request meanwhile.
-                    batch = self._newest.get(key) or await self._add(key, request)
-            if key in batch.unheld:
-                batch.unheld.discard(key)
-                if (usd := batch.most_usd[key]) is not None:
-                    batch.held[key] = self.budget.hold(usd)
-            if batch.work is None:
-                batch.work = asyncio.ensure_future(self._take_through(batch))
-            try:
-                await asyncio.shield(batch.work)
-                if batch.answers is None:
-                    continue
-                reply = await self._read(key, request, batch)
-            except UnavailableError:
-                # This command gets no more news of batches in progress: they count as spent.
-                for each in self._batches:
-                    self._settle_all(each, None)
-                raise
-            except ModelError as error:
+        if (batch := self._newest.get(key)) is None:
+            if self.cache is not None and (kept := self.cache.get(key)) is not None:
+                return kept.model_copy(update={"cost_usd": cost_usd(self.budget.tariff, kept)})
+            async with self._adding:
+                # Another sample may have sent the same request meanwhile.
+                batch = self._newest.get(key) or await self._add(key, request)
+        if key in batch.unheld:
+            batch.unheld.discard(key)
+            if (usd := batch.most_usd[key]) is not None:
+                batch.held[key] = self.budget.hold(usd)
+        if batch.work is None:
+            batch.work = asyncio.ensure_future(self._take_through(batch))
+        try:
+            await asyncio.shield(batch.work)
+            reply = None if batch.answers is None else await self._read(key, request, batch)
+        except UnavailableError:
+            # This command gets no more news of batches in progress: they count as spent.
+            for each in self._batches:
+                self._settle_all(each, None)
+            raise
+        except ModelError as error:
+            if batch in self._ended_before and request.sample in self.files.recorded:
+                # It was recorded and counted by an earlier command.
+                self._settle(key, batch, 0.0)
                 if self._newest.get(key) is batch:
                     del self._newest[key]
-                if batch in self._ended_before and request.sample in self.files.recorded:
-                    # It was recorded and counted.
-                    self._settle(key, batch, 0.0)
-                    continue
-                self._settle(key, batch, None if may_be_billed(error) else 0.0)
-                error.billed_usd = self._billed_usd.get(key)
-                failures += 1
-                if isinstance(error, RetryableError) and failures < self.policy.attempts:
-                    continue
-                raise
-            if key in self._given:
-                # A second sample with the same request.
-                return reply.model_copy(update={"cached": True, "attempts": 0})
-            self._given.add(key)
-            self._settle(key, batch, reply.cost_usd)
-            self.budget.learn(estimate(self.config, request), reply.usage)
-            update = {"billed_usd": self._billed_usd.get(key), "attempts": failures + 1}
-            reply = reply.model_copy(update=update)
-            if self.cache is not None:
-                self.cache.put(key, self.config.id, reply)
-            return reply
+                return await self.ask(request)
+            error.billed_usd = self._settle(key, batch, None if may_be_billed(error) else 0.0)
+            raise
+        if reply is None:
+            assert self._refusal is not None, "a batch without answers was refused"
+            raise self._refusal
+        if key in self._given:
+            # A second sample with the same request.
+            return reply.model_copy(update={"cached": True, "attempts": 0})
+        self._given.add(key)
+        billed_usd = self._settle(key, batch, reply.cost_usd)
+        self.budget.learn(estimate(self.config, request), reply.usage)
+        reply = reply.model_copy(update={"billed_usd": billed_usd, "attempts": 1})
+        if self.cache is not None:
+            self.cache.put(key, self.config.id, reply)
+        return reply
 
     async def aclose(self) -> None:
         """Release connections; batches continue at the provider."""
@@ -207,7 +202,7 @@ class BatchModel:
         for work in works:
             work.cancel()
         await asyncio.gather(*works, return_exceptions=True)
-        await self._provider.aclose()
+        await self._provider.http.aclose()
 
     async def _add(self, key: str, request: Request) -> Batch:
         """Add a request to the current draft, or a new one, once the budget has room for it."""
@@ -244,11 +239,9 @@ class BatchModel:
         self._newest[key] = draft
         return draft
 
-    def _settle(self, key: str, batch: Batch, usd: float | None) -> None:
-        """Count the cost of a request once; None is the most that it can have cost."""
-        if key in batch.held:
-            spent_usd = self.budget.settle(batch.held.pop(key), usd)
-            self._billed_usd[key] = self._billed_usd.get(key, 0.0) + spent_usd
+    def _settle(self, key: str, batch: Batch, usd: float | None) -> float | None:
+        """Count the cost of a request once, and return it; None is the most that it can cost."""
+        return self.budget.settle(batch.held.pop(key), usd) if key in batch.held else None
 
     def _settle_all(self, batch: Batch, usd: float | None) -> None:
         while batch.held:
@@ -286,17 +279,11 @@ class BatchModel:
         elif batch.event == "intended" and self._refusal is not None:
             raise self._refusal
         path = self.files.answers(batch.token)
-        if batch.event == "created":
-            lines = await self._answered(batch, path)
-        elif batch.event != "ended":
-            return
-        elif path.exists():
+        lines = None
+        if batch.event == "ended" and path.exists():
             lines = await asyncio.to_thread(path.read_bytes)
-        else:
-            raise UnavailableError(
-                f"the answers of batch {batch.shown} are gone ({path}): without its lines in "
-                f"{BATCHES} its requests are sent again"
-            )
+        elif batch.event != "lost":
+            lines = await self._answered(batch, path)
         if lines is not None:
             batch.is_blank = not lines.strip()
             batch.answers = await asyncio.to_thread(answers_of, lines, self._provider, batch)
@@ -334,19 +321,10 @@ class BatchModel:
 
     async def _patiently(self, call: Callable[[], Awaitable[T]]) -> T:
         """Call until it succeeds or cannot. Raises UnavailableError if it never does."""
-
-        def on_retry(error: RetryableError, wait_s: float) -> None:
-            self.report(ModelEvent(self.name, "retry", str(error), wait_s))
-
         try:
-            async for attempt in self.policy.retrying(on_retry):
-                with attempt:
-                    return await call()
-        except UnavailableError:
-            raise
+            return await self.policy.retrying(self.name, self.report)(call)
         except ModelError as error:
             raise UnavailableError(str(error), status=error.status, sent=error.sent) from None
-        raise AssertionError("tenacity neither returned nor raised")
 
     async def _answered(self, batch: Batch, path: Path) -> bytes | None:
         """Wait for a batch and keep its answers; None if it was refused as a whole."""
@@ -359,16 +337,13 @@ class BatchModel:
                 return None
             lines = await self._patiently(partial(self._provider.results, status))
         except ModelError as error:
-            # Errors of its requests are different: these are asked again, or recorded.
+            # Errors of its requests are different: these are recorded.
             why = f"no answers of batch {batch.shown}, which stays at the provider: {error}"
             raise UnavailableError(why, status=error.status, sent=error.sent) from None
         with writing(path):
             path.parent.mkdir(parents=True, exist_ok=True)
             await asyncio.to_thread(atomic_write, path, lines, sync=True)
         await self._note(batch, "ended", words=status.words)
-        if status.state == "cancelled":
-            why = f"batch {batch.shown} was cancelled; the same command asks the rest"
-            self._refusal = UnavailableError(why)
         return lines
 
     async def _last_status(self, batch: Batch) -> BatchStatus:
@@ -397,7 +372,6 @@ class BatchModel:
             why = f"batch {batch.shown} ended before this was asked: {answer}"
             raise RetryableError(why, sent="no")
         reply = await self.client(_NoConnection(answer)).complete(request)
-        reply = counted(reply, estimate(self.config, request))
         reply = reply.model_copy(update={"latency_s": 0.0, "batched": True})
         return reply.model_copy(update={"cost_usd": cost_usd(self.budget.tariff, reply)})
 

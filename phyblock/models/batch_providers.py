@@ -20,8 +20,17 @@ from urllib.parse import urlsplit
 from phyblock.config.models import ModelConfig, host_of
 from phyblock.errors import ModelError, RetryableError, UnavailableError
 from phyblock.files import load_json
-from phyblock.models.client import OPENAI_API_BASE, Answer, HttpClient, error_of, malformed, shown
-from phyblock.models.keys import api_key, hidden, secrets_of
+from phyblock.models.client import (
+    OPENAI_API_BASE,
+    Answer,
+    HttpClient,
+    api_key,
+    error_of,
+    hidden,
+    malformed,
+    secrets_of,
+    shown,
+)
 
 T = TypeVar("T")
 Post = tuple[str, bytes, Mapping[str, str]]
@@ -38,12 +47,12 @@ _LARGEST_RESULTS_BYTES = 1024**3
 class BatchStatus:
     """The state of a batch, as its provider reports it.
 
-    No request of a `refused` batch was answered; a `cancelled` one may lack some answers. `words`
-    are the provider's message, with counts and errors; `results` are the addresses of the answers.
+    No request of a `refused` batch was answered; an `ended` one may lack some answers. `words` are
+    the provider's message, with counts and errors; `results` are the addresses of the answers.
     """
 
     id: str
-    state: Literal["running", "ended", "cancelled", "refused"]
+    state: Literal["running", "ended", "refused"]
     words: str
     results: tuple[str, ...]
 
@@ -67,7 +76,7 @@ class BatchProvider(ABC):
         self._base = base
         self._url = url
         self._secrets = secrets_of(config)
-        self._http = HttpClient(_TRANSFER_S, _LARGEST_RESULTS_BYTES)
+        self.http = HttpClient(_TRANSFER_S, _LARGEST_RESULTS_BYTES)
 
     @abstractmethod
     def line(self, custom_id: str, body: bytes, headers: Mapping[str, str]) -> bytes:
@@ -105,10 +114,6 @@ class BatchProvider(ABC):
         reason why it was never processed. Raises one of UNREADABLE for a malformed line.
         """
 
-    async def aclose(self) -> None:
-        """Close all connections."""
-        await self._http.aclose()
-
     @abstractmethod
     async def _prepare(self, token: str, lines: Sequence[bytes]) -> Post:
         """Return the call that creates a batch, without making it."""
@@ -144,7 +149,7 @@ class BatchProvider(ABC):
             own = {name: value.replace("{key}", key) for name, value in self.headers.items()}
             sent = {"Content-Type": "application/json", **own, **(headers or {})}
             method = "GET" if body is None else "POST"
-            answer = await self._http.send(url, body or b"", sent, method=method)
+            answer = await self.http.send(url, body or b"", sent, method=method)
             if answer.fault or not answer.is_success:
                 raise error_of(answer)
             try:
@@ -203,7 +208,7 @@ class _OpenAI(BatchProvider):
         word, counts = batch["status"], batch.get("request_counts") or {}
         files = [batch[name] for name in ("output_file_id", "error_file_id") if batch.get(name)]
         # A batch without its files yet must not count as empty, or it would be asked again.
-        ends = {"expired": "ended", "cancelled": "cancelled", "failed": "refused"}
+        ends = {"expired": "ended", "cancelled": "ended", "failed": "refused"}
         return self._status(
             batch["id"],
             "ended" if word == "completed" and files else ends.get(word, "running"),
@@ -249,10 +254,9 @@ class _Anthropic(BatchProvider):
     def _read_status(self, batch: Any) -> BatchStatus:
         word, counts = batch["processing_status"], batch["request_counts"]
         has_ended = word == "ended"
-        state = "cancelled" if counts.get("canceled") else "ended"
         return self._status(
             batch["id"],
-            state if has_ended else "running",
+            "ended" if has_ended else "running",
             (word, counts.get("succeeded"), ()),
             # Not `results_url`, which behind a gateway is the provider's own and unreachable.
             [f"{self._url}/{batch['id']}/results"] if has_ended else [],
@@ -306,7 +310,7 @@ class _Gemini(BatchProvider):
         facts = batch.get("metadata") or {}
         # BATCH_STATE_... or JOB_STATE_..., by version.
         word = (facts.get("state") or "").rpartition("STATE_")[2].lower()
-        ends = {"succeeded": "ended", "expired": "ended", "cancelled": "cancelled"}
+        ends = dict.fromkeys(("succeeded", "expired", "cancelled"), "ended")
         stats = facts.get("batchStats") or {}
         file = (batch.get("response") or facts.get("output") or {}).get("responsesFile")
         error = batch.get("error")

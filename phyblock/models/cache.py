@@ -12,8 +12,9 @@ import contextlib
 import json
 import sqlite3
 import time
-from collections.abc import AsyncIterator, Callable, Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from weakref import WeakValueDictionary
 
 from phyblock.config.models import ModelConfig
 from phyblock.errors import Problem, StoreError, reason_of
@@ -69,7 +70,7 @@ class ReplyCache:
         self.path = path
         self._report = report
         self._is_off = False
-        self._asked: dict[str, asyncio.Future[None]] = {}
+        self._locks: WeakValueDictionary[str, asyncio.Lock] = WeakValueDictionary()
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
@@ -97,38 +98,25 @@ class ReplyCache:
         row = None
         with self._using():
             row = self._db.execute(sql, (key,)).fetchone() if not self._is_off else None
-        if row is None:
-            return None
-        try:
-            found = {**json.loads(row[0].decode()), "cached": True, "attempts": 0}
-            return Reply.model_validate(found, strict=True)
-        except (ValueError, TypeError, RecursionError) as error:
-            if self._report is not None:
-                self._report(f"reply cache {self.path}: broken reply, requested again ({error})")
-            return None
+        with contextlib.suppress(ValueError, TypeError, RecursionError):
+            if row is not None:
+                found = {**json.loads(row[0].decode()), "cached": True, "attempts": 0}
+                return Reply.model_validate(found, strict=True)
+        return None
 
-    def put(self, key: str, model_id: str, reply: Reply) -> bool:
-        """Keep a reply, unless it is empty, truncated or refused; True if it was kept."""
+    def put(self, key: str, model_id: str, reply: Reply) -> None:
+        """Keep a reply, unless it is empty, truncated or refused."""
         if self._is_off or reply.finish in ("length", "refusal") or not reply.text.strip():
-            return False
+            return
         # The cost in this run does not apply to others.
         fields = reply.model_dump(exclude={"billed_usd"})
         row = (key, model_id, time.time(), json.dumps(fields, separators=(",", ":")))
         with self._using():
             self._db.execute("INSERT OR REPLACE INTO replies VALUES (?, ?, ?, ?)", row)
-            return True
-        return False
 
-    @contextlib.asynccontextmanager
-    async def shared(self, key: str) -> AsyncIterator[None]:
-        """Wait until no other task of this process sends the same request."""
-        while (other := self._asked.get(key)) is not None:
-            await asyncio.wait((other,))
-        self._asked[key] = asyncio.get_running_loop().create_future()
-        try:
-            yield
-        finally:
-            self._asked.pop(key).set_result(None)
+    def shared(self, key: str) -> asyncio.Lock:
+        """Return the lock under which one task of this process at a time sends a request."""
+        return self._locks.setdefault(key, asyncio.Lock())
 
     def close(self) -> None:
         """Release the file; the cache is not used afterwards."""
@@ -141,9 +129,7 @@ class ReplyCache:
         tables = self._db.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
         self._db.execute("COMMIT")
         if version != SCHEMA and (version != 0 or tables != 0):
-            message = "belongs to another version of phyblock, or is not a reply cache"
-            found, allowed = f"schema {version}", f"schema {SCHEMA}"
-            raise self._problem(message, found=found, allowed=allowed)
+            raise self._problem("belongs to another version of phyblock, or is not a reply cache")
         self._db.execute("PRAGMA journal_mode = WAL")
         self._db.execute("PRAGMA synchronous = NORMAL")
         if version != SCHEMA:
@@ -163,6 +149,5 @@ class ReplyCache:
             self._is_off = True
             self._report(f"reply cache {self.path}: cannot be used: {error}; going on without it")
 
-    def _problem(self, message: str, found: str = "", allowed: str = "") -> StoreError:
-        where = f"reply cache {self.path}"
-        return StoreError(Problem(where, message, found=found, allowed=allowed, hint=_HINT))
+    def _problem(self, message: str) -> StoreError:
+        return StoreError(Problem(f"reply cache {self.path}", message, hint=_HINT))

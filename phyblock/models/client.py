@@ -1,4 +1,4 @@
-"""Parts of both clients: one HTTP client with bounds, the reply in an answer, or its error.
+"""Parts of both clients: keys, one HTTP client with bounds, the reply in an answer, or its error.
 
 Redirects are not followed, so that keys and prompts go only to the host that was named. A body is
 read up to a limit. The time limit applies to the whole exchange, whatever the server does. Nothing
@@ -7,18 +7,22 @@ is sent twice. aiohttp is imported by the first call.
 
 from __future__ import annotations
 
+import base64
+import functools
+import html
 import json
 import math
+import os
 import re
 import time
 import urllib.parse
 import urllib.request
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from phyblock.config.models import ModelConfig, host_of
+from phyblock.config.models import ADDRESS_ALLOWED, ModelConfig, host_of, is_address
 from phyblock.errors import (
     DataError,
     ModelError,
@@ -26,11 +30,11 @@ from phyblock.errors import (
     RefusedError,
     RetryableError,
     SampleError,
+    SpecError,
     UnavailableError,
     UnreachableError,
 )
 from phyblock.files import load_json
-from phyblock.models.keys import api_key, hidden, secrets_of
 from phyblock.models.request import Request, wire_messages, wire_params
 from phyblock.records.record import Reply, Usage
 from phyblock.text import well_formed
@@ -40,6 +44,48 @@ if TYPE_CHECKING:
     import aiohttp
 
 OPENAI_API_BASE = "https://api.openai.com/v1"
+
+_KEY_VARIABLES: Mapping[str, tuple[str, ...]] = {
+    "cloudflare": ("CLOUDFLARE_API_KEY",),
+    "fireworks_ai": ("FIREWORKS_AI_API_KEY", "FIREWORKS_API_KEY"),
+    "gemini": ("GEMINI_API_KEY", "GOOGLE_API_KEY"),
+    "perplexity": ("PERPLEXITYAI_API_KEY", "PERPLEXITY_API_KEY"),
+    "qwencloud": ("QWENCLOUD_API_KEY", "DASHSCOPE_API_KEY"),
+    "together_ai": ("TOGETHERAI_API_KEY", "TOGETHER_API_KEY", "TOGETHER_AI_API_KEY"),
+}
+"""Variables of providers whose key is not in `<PROVIDER>_API_KEY`, in the order of lookup."""
+
+_ADDRESS_VARIABLES: Mapping[str, tuple[str, ...]] = {
+    "anthropic": ("ANTHROPIC_API_BASE", "ANTHROPIC_BASE_URL"),
+    "fireworks_ai": ("FIREWORKS_API_BASE",),
+    "mistral": ("MISTRAL_AZURE_API_BASE", "MISTRAL_API_BASE"),
+    "ollama_chat": ("OLLAMA_API_BASE",),
+    "openai": ("OPENAI_BASE_URL", "OPENAI_API_BASE"),
+}
+"""Variables of a server's address, if not `<PROVIDER>_API_BASE`, in litellm's order."""
+
+_OWN_CREDENTIALS = (
+    "azure", "bedrock", "github_copilot", "oci", "sagemaker", "vertex_ai", "watsonx",
+)  # fmt: skip
+"""Providers that can sign in without an API key, which litellm handles by itself."""
+
+KEYLESS = ("hosted_vllm", "lm_studio", "llamafile", "ollama", "ollama_chat")
+"""Local servers, which accept a key but need none."""
+
+_PLACEHOLDER = "no-key"
+_PLACEHOLDERS = (_PLACEHOLDER, "empty", "none", "null", "dummy", "test")
+"""Placeholders for an unneeded key, in lower case; they are not secrets."""
+
+_CALLED_SECRET = re.compile(
+    r"(?:^|_|API)(?:KEY|TOKEN|SECRET|PASSW(?:OR)?D|CREDENTIALS?|JWT)(?:_|$)", re.IGNORECASE
+)
+_SHORTEST_KEY = 4
+_SHORT = 8
+_MASK = "[key]"
+_LOOKS_SECRET = re.compile(
+    r"(?:\bsk-[\w-]{6,}|\bAIza[\w-]{10,}|(?<=Bearer )[\w.~+/-]{6,}|(?<=Basic )[\w+/=-]{6,}"
+    r"|(?<=[?&]key=)[^&\s'\"]+|(?<=://)[^/\s@]+(?=@))"
+)
 
 _LONGEST_CONNECT_S = 30.0
 _LONGEST_MESSAGE = 500
@@ -61,8 +107,8 @@ _NEVER = re.compile(
     r"|LLM Provider NOT provided|Server is pinned to|Unexpected fields in the request",
     re.IGNORECASE,
 )
-_MOST_TOKENS = 10**9
-"""A hundred times the longest existing context."""
+_MOST_TOKENS = 10**7
+"""As many as the longest existing context."""
 
 _FINISH: Mapping[str, Finish] = {
     **dict.fromkeys(("stop", "end_turn", "stop_sequence", "eos", "eos_token"), "stop"),
@@ -73,6 +119,139 @@ _FINISH: Mapping[str, Finish] = {
 }
 """Providers' words for the end of a reply, in lower case."""
 _THINKING = re.compile(r"\s*<(think|thinking)>(.*?)</\1>\s*(.*)", re.DOTALL)
+
+
+@dataclass(frozen=True)
+class KeyStatus:
+    """The state of a model's key: the `variables` that are checked, in order, the `key` in the
+    first that holds one, and whether calls fail without.
+    """
+
+    variables: tuple[str, ...]
+    key: str | None = field(repr=False)
+    is_needed: bool
+
+
+def api_key_status(config: ModelConfig) -> KeyStatus:
+    """Return the state of the model's key in the environment."""
+    if config.kind != "litellm":
+        return KeyStatus((), None, is_needed=False)
+    variables = _variables(config)
+    keys = (os.environ.get(name, "").strip() for name in variables)
+    is_needed = config.api_key_env is not None or not (
+        config.addresses or config.provider in KEYLESS + _OWN_CREDENTIALS
+    )
+    return KeyStatus(variables, next(filter(None, keys), None), is_needed)
+
+
+def api_key(config: ModelConfig) -> str | None:
+    """Return the key to send; None leaves it to litellm (providers with their own credentials).
+
+    A server named by `api_base` gets a placeholder if no key is set, since clients require one.
+    Raises UnavailableError if a key is needed and not set, or no header can carry it.
+    """
+    status = api_key_status(config)
+    names = " or ".join(status.variables)
+    if status.key is not None:
+        if not all(" " <= character <= "~" for character in status.key):
+            why = f"{names} holds a line break or another character that no header can carry"
+            raise UnavailableError(why, sent="no")
+        return status.key
+    if status.is_needed:
+        why = f"no API key for {config.name}: set {names} in the environment"
+        raise UnavailableError(why, sent="no")
+    return None if config.provider in _OWN_CREDENTIALS else _PLACEHOLDER
+
+
+def server_address(model_id: str) -> str | None:
+    """Return the address of the model's server in the environment, or None.
+
+    litellm would find it too, but then replies of two servers could be confused. Raises SpecError
+    if it is not an address, or may contain a key or a password, since it is stored and shown.
+    """
+    provider = model_id.partition("/")[0]
+    usual = f"{provider.upper().replace('-', '_')}_API_BASE"
+    for name in _ADDRESS_VARIABLES.get(provider, (usual,)):
+        if value := os.environ.get(name):
+            if not is_address(value):
+                message = "is not an address that can be used"
+                where = f"environment variable {name}"
+                raise SpecError(Problem(where, message, allowed=ADDRESS_ALLOWED))
+            return value
+    return None
+
+
+def secrets_of(config: ModelConfig) -> tuple[str, ...]:
+    """Return the values that no stored text may contain, longest first.
+
+    They are the model's key, and all environment variables named as a key, token, secret, password
+    or credential, since litellm signs in with many of them. Values of fewer than 4 characters (8
+    for others than the model's key) and common words for "no key" are excluded: removing them would
+    ruin texts and hide nothing.
+    """
+    own = _variables(config)
+    secrets = {
+        value.strip()
+        for name, value in os.environ.items()
+        if (name in own and len(value.strip()) >= _SHORTEST_KEY)
+        or (_CALLED_SECRET.search(name) and len(value.strip()) >= _SHORT)
+    }
+    secrets = {value for value in secrets if value.lower() not in _PLACEHOLDERS}
+    return tuple(sorted(secrets, key=lambda value: (-len(value), value)))
+
+
+def _variables(config: ModelConfig) -> tuple[str, ...]:
+    if config.api_key_env is not None:
+        return (config.api_key_env,)
+    usual = f"{config.provider.upper().replace('-', '_')}_API_KEY"
+    return _KEY_VARIABLES.get(config.provider, (usual,))
+
+
+def hidden(text: str, secrets: Iterable[str], *, guess: bool = True) -> str:
+    """Return `text` with every secret masked, whether plain or escaped (JSON, HTML, URL, base64).
+
+    A secret of fewer than 8 characters is masked only as a whole word: inside a longer word it is a
+    coincidence. With `guess`, for messages and not for replies, text that looks like a key is also
+    masked, and the beginning of a secret at the very end of the text, where it was cut.
+    """
+    known = tuple(secrets)
+    for form in _forms(known):
+        if form in text:
+            exact = re.escape(form)
+            word = rf"(?<![^\W_]){exact}(?![^\W_])" if len(form) < _SHORT else exact
+            text = re.sub(word, _MASK, text)
+    if not guess:
+        return text
+    for form in _forms(known):
+        for length in range(len(form) - 1, _SHORTEST_KEY - 1, -1):
+            if text.endswith(form[:length]):
+                text = text[:-length] + _MASK
+                break
+    return _LOOKS_SECRET.sub(_MASK, text)
+
+
+@functools.lru_cache(maxsize=64)
+def _forms(secrets: tuple[str, ...]) -> tuple[str, ...]:
+    """Return all forms in which a server, a library or a log may write one of the secrets.
+
+    The longest come first, since one may begin another. In base64 a secret is found at any place in
+    the encoded bytes, also in `user:key`; the characters at either end that also depend on its
+    neighbors are omitted.
+    """
+    forms: set[str] = set()
+    for secret in secrets:
+        quoted, escaped = urllib.parse.quote(secret, safe=""), json.dumps(secret)[1:-1]
+        forms |= {secret, " ".join(secret.split()), repr(secret)[1:-1], html.escape(secret)}
+        forms |= {escaped, escaped.replace("/", "\\/"), secret.replace("'", "\\'")}
+        forms |= {quoted, urllib.parse.quote(secret), urllib.parse.quote_plus(secret)}
+        forms.add(re.sub("%..", lambda match: match[0].lower(), quoted))
+        for before in range(3):
+            data = bytes(before) + secret.encode()
+            inside = slice((before * 8 + 5) // 6, len(data) * 8 // 6)
+            for encode in (base64.b64encode, base64.urlsafe_b64encode):
+                encoded = encode(data).decode()[inside]
+                forms |= {encoded} if len(encoded) >= _SHORT else set()
+    return tuple(sorted(forms, key=lambda form: (-len(form), form)))
 
 
 class Client(ABC):
@@ -91,6 +270,7 @@ class Client(ABC):
     async def complete(self, request: Request) -> Reply:
         """Return the validated reply, without its cost; raises ModelError."""
         seed = request.seed if self.takes_seed else None
+        started_s = time.perf_counter()
         try:
             reply = await self._complete(request, seed)
         except ModelError as error:
@@ -101,7 +281,8 @@ class Client(ABC):
             for name in ("text", "reasoning", "provider_model")
             if (text := getattr(reply, name))
         }
-        return reply.model_copy(update={**texts, "seed_sent": seed is not None})
+        known = {"latency_s": time.perf_counter() - started_s, "seed_sent": seed is not None}
+        return reply.model_copy(update={**texts, **known})
 
     @property
     def takes_seed(self) -> bool:
@@ -248,9 +429,8 @@ class OpenAIClient(Client):
         fields |= extra_body
         fields["messages"] = wire_messages(request.messages, self.config.image_detail)
         body = json.dumps(fields, allow_nan=False).encode()
-        started_s = time.perf_counter()
         answer = await self.http.send(self._url, body, headers)
-        return read_completion(read_json(answer), time.perf_counter() - started_s, answer.status)
+        return read_completion(read_json(answer), answer.status)
 
 
 def read_json(answer: Answer) -> object:
@@ -271,7 +451,7 @@ def read_json(answer: Answer) -> object:
     return body
 
 
-def read_completion(body: object, latency_s: float, status: int = 200) -> Reply:
+def read_completion(body: object, status: int = 200) -> Reply:
     """Return the reply in the decoded body of a success.
 
     Thoughts that a server leaves in the text between think tags become reasoning, as in litellm.
@@ -282,7 +462,7 @@ def read_completion(body: object, latency_s: float, status: int = 200) -> Reply:
         raise malformed(status, f"no choices in it: {str(body)[:2_000]}")
     if not raw.reasoning and (match := _THINKING.match(raw.text)):
         raw = raw.model_copy(update={"reasoning": match[2], "text": match[3]})
-    return raw.model_copy(update={"latency_s": latency_s})
+    return raw
 
 
 def malformed(status: int, why: str) -> RetryableError:
@@ -369,10 +549,12 @@ def read_chat_completion(raw: object) -> Reply | None:
     refusal, details = message.get("refusal"), "usage.prompt_tokens_details"
     cached = f"{details}.cached_tokens", "usage.cached_tokens", "usage.prompt_cache_hit_tokens"
     written = f"{details}.cache_write_tokens", f"{details}.cache_creation_tokens"
+    reasoning = _count(raw, "usage.completion_tokens_details.reasoning_tokens")
     usage = Usage(
-        prompt_tokens=_count(raw, "usage.prompt_tokens"),
-        completion_tokens=_count(raw, "usage.completion_tokens"),
-        reasoning_tokens=_count(raw, "usage.completion_tokens_details.reasoning_tokens"),
+        # Some servers report 0, which no call takes.
+        prompt_tokens=_count(raw, "usage.prompt_tokens") or None,
+        completion_tokens=_count(raw, "usage.completion_tokens") or None,
+        reasoning_tokens=None if reasoning == 0 and (beside or thoughts) else reasoning,
         cached_tokens=_count(raw, *cached),
         cache_write_tokens=_count(raw, *written),
     )

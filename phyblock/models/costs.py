@@ -13,14 +13,14 @@ import json
 import math
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from phyblock.config.models import ModelConfig, Price, Tariff, host_of
 from phyblock.errors import BudgetReachedError, ModelError, UnavailableError
 from phyblock.files import read_own_yaml
-from phyblock.models.keys import KEYLESS, api_key_status
+from phyblock.models.client import KEYLESS, api_key_status
 from phyblock.models.request import Image, Request, wire_params
 from phyblock.records.record import Reply, Usage
 from phyblock.types import ImageDetail
@@ -46,7 +46,6 @@ _ROOM_TO_THINK_TOKENS = 8_192
 _LONGEST_REPLY_TOKENS = 32_768
 _PROMPT_MARGIN = 1.5
 _MOST_TIMES_EXPECTED = 100
-_LEAST_EXPECTED_TOKENS = 1_000
 
 
 def tariff_of(config: ModelConfig) -> Tariff | None:
@@ -103,7 +102,7 @@ def is_billed(config: ModelConfig) -> bool:
     """
     tariff = tariff_of(config)
     if tariff is None:
-        return config.provider not in KEYLESS or api_key_status(config).is_set
+        return config.provider not in KEYLESS or api_key_status(config).key is not None
     return not is_free(tariff)
 
 
@@ -160,20 +159,29 @@ def _mapped_price(entry: Mapping[str, Any], ending: str) -> dict[str, Any] | Non
     return usd
 
 
+@dataclass(frozen=True, eq=False)
+class Reservation:
+    """The most that a call in progress can cost [US dollars]."""
+
+    usd: float
+
+
+@dataclass(eq=False)
 class Budget:
     """A cost limit for a whole run: room is reserved before a call and settled after it.
 
-    Spending never decreases, and an unknown cost counts as the whole reserve. Without
-    `max_cost_usd` it only counts. `spent_usd` is the cost of settled calls, which includes that of
-    earlier commands.
+    Spending never decreases, and an unknown cost counts as the whole reserve. Without a limit it
+    only counts. `spent_usd` is the cost of settled calls, which includes that of earlier commands.
     """
 
-    def __init__(self, max_cost_usd: float | None = None, spent_usd: float = 0.0) -> None:
-        self.max_usd = math.inf if max_cost_usd is None else max_cost_usd
-        self.spent_usd = spent_usd
-        self.held_usd = 0.0
-        self.holds = 0
-        self.changed = asyncio.Event()
+    max_cost_usd: float | None = None
+    spent_usd: float = 0.0
+    held_usd: float = 0.0
+    holds: int = 0
+    changed: asyncio.Event = field(default_factory=asyncio.Event)
+
+    def __post_init__(self) -> None:
+        self.max_usd = math.inf if self.max_cost_usd is None else self.max_cost_usd
 
 
 class ModelBudget:
@@ -187,9 +195,7 @@ class ModelBudget:
     def __init__(self, run: Budget, tariff: Tariff | None = None) -> None:
         self._run = run
         self.tariff = tariff
-        self._held: dict[int, float] = {}
-        self._next = 0
-        self._under_way: set[int] = set()
+        self._under_way: set[Reservation] = set()
         self._settled = 0
         self._prompt_ratio = self._reply_ratio = 1.0
         self.is_limited = run.max_usd < math.inf
@@ -207,9 +213,10 @@ class ModelBudget:
             raise UnavailableError(f"{why}: set it in models.yaml, or run without max_cost_usd")
         return most_usd(self.tariff, prompt, longest, batched=batched)
 
-    async def reserve(self, most_usd: Callable[[], float], *, together: bool = False) -> int:
-        """Reserve the most that a call can cost, waiting for calls in progress to settle if needed;
-        return the reservation's number.
+    async def reserve(
+        self, most_usd: Callable[[], float], *, together: bool = False
+    ) -> Reservation:
+        """Reserve the most that a call can cost, waiting for calls in progress to settle if needed.
 
         `most_usd` is computed again whenever a call has settled, since more is known of the model
         then. Calls that are sent `together` do not wait for the first ones. Raises
@@ -221,36 +228,33 @@ class ModelBudget:
             is_slow = self.is_limited and len(self._under_way) > self._settled
             fits = run.spent_usd + run.held_usd + usd <= run.max_usd
             if fits and (together or not is_slow):
-                number = self.hold(usd)
+                reservation = self.hold(usd)
                 if not together:
-                    self._under_way.add(number)
-                return number
+                    self._under_way.add(reservation)
+                return reservation
             if not run.holds and run.spent_usd + usd > run.max_usd:
                 spent = f"max_cost_usd: ${run.spent_usd:.4f} of ${run.max_usd:g} spent"
                 raise BudgetReachedError(f"{spent}; the next call can cost ${usd:.4f}")
             run.changed.clear()
             await run.changed.wait()
 
-    def hold(self, usd: float) -> int:
-        """Make a reservation even if it exceeds the limit; return its number."""
-        self._next += 1
-        self._held[self._next] = usd
+    def hold(self, usd: float) -> Reservation:
+        """Make a reservation even if it exceeds the limit."""
         self._run.held_usd += usd
         self._run.holds += 1
-        return self._next
+        return Reservation(usd)
 
-    def settle(self, reservation: int, usd: float | None) -> float:
+    def settle(self, reservation: Reservation, usd: float | None) -> float:
         """Replace a reservation by the real cost; None, or an invalid amount, counts the whole
         reservation. Return the counted amount [US dollars].
         """
-        held = self._held.pop(reservation)
         self._under_way.discard(reservation)
         self._settled += 1
-        counted = usd if usd is not None and math.isfinite(usd) and usd >= 0 else held
+        counted = usd if usd is not None and math.isfinite(usd) and usd >= 0 else reservation.usd
         run = self._run
         run.holds -= 1
         # Rounding errors of the running sum must not add up over a run.
-        run.held_usd = max(0.0, run.held_usd - held) if run.holds else 0.0
+        run.held_usd = max(0.0, run.held_usd - reservation.usd) if run.holds else 0.0
         run.spent_usd += counted
         run.changed.set()
         return counted
@@ -314,40 +318,12 @@ def may_be_billed(error: ModelError) -> bool:
     return error.sent in ("lost", "maybe") or 200 <= (error.status or 0) < 300
 
 
-def counted(reply: Reply, expected: Estimate) -> Reply:
-    """Return the reply with only its plausible counts; the others become unknown.
-
-    Every request has prompt tokens, every reply with text has reply tokens, and no call takes a
-    hundred times the expected ones.
-    """
-
-    def plausible(count: int | None, least: int, expected: int) -> int | None:
-        most = _MOST_TIMES_EXPECTED * max(expected, _LEAST_EXPECTED_TOKENS)
-        is_count = isinstance(count, int) and not isinstance(count, bool)
-        return count if is_count and least <= (count or 0) <= most else None
-
-    usage, asked, longest = reply.usage, expected.prompt_tokens, expected.most_completion_tokens
-    says, thinks = bool(reply.text or reply.reasoning), bool(reply.reasoning)
-    prompt = plausible(usage.prompt_tokens, 1, asked)
-    cached = plausible(usage.cached_tokens, 0, asked)
-    written = plausible(usage.cache_write_tokens, 0, asked)
-    if (cached or 0) + (written or 0) > (prompt or 0):
-        cached = written = None
-    known = Usage(
-        prompt_tokens=prompt,
-        completion_tokens=plausible(usage.completion_tokens, int(says), longest),
-        reasoning_tokens=plausible(usage.reasoning_tokens, int(thinks), longest),
-        cached_tokens=cached,
-        cache_write_tokens=written,
-    )
-    return reply.model_copy(update={"usage": known})
-
-
 _PIECE = re.compile(
     r"[^\r\n\w]?[A-Za-z]+|[^\W\d_a-zA-Z]{1,2}|\d{1,3}| ?[^\s\w]+[\r\n]*|_|\s*[\r\n]+|\s+(?!\S)|\s+"
 )
 
 
+@functools.lru_cache(maxsize=1024)
 def text_tokens(model_id: str, text: str) -> float:
     """Return an estimate of a text's tokens; `model_id` may name any provider.
 
@@ -358,12 +334,7 @@ def text_tokens(model_id: str, text: str) -> float:
     name = model_id.lower()
     if "gemini" in name or "gemma" in name:
         return len(text) / 4
-    return _pieces(text) * (1.03 if "claude" in name else 1.0)
-
-
-@functools.lru_cache(maxsize=1024)
-def _pieces(text: str) -> int:
-    return sum(1 for _ in _PIECE.finditer(text))
+    return len(_PIECE.findall(text)) * (1.03 if "claude" in name else 1.0)
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,6 @@ import asyncio
 import contextlib
 import logging
 import os
-import time
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from functools import cache, cached_property
@@ -22,9 +21,11 @@ from urllib.parse import urlsplit
 from phyblock.config.models import DIRECT_PROVIDERS, ModelConfig
 from phyblock.errors import DataError, RefusedError, RetryableError, UnavailableError
 from phyblock.models.client import (
+    KEYLESS,
     Answer,
     Client,
     HttpClient,
+    api_key,
     error_of,
     malformed,
     read_completion,
@@ -32,7 +33,6 @@ from phyblock.models.client import (
     read_raw_reply,
 )
 from phyblock.models.costs import mapped_providers
-from phyblock.models.keys import KEYLESS, api_key
 from phyblock.models.request import Request, wire_messages, wire_params
 from phyblock.records.record import Reply, Usage
 
@@ -105,28 +105,19 @@ class LitellmClient(Client):
         given = {name: value for name, value in fields.items() if value is not None}
         exchange = _Exchange(self.http)
         token = _CURRENT.set(exchange)
-        started_s = time.perf_counter()
         try:
             limit_s = config.timeout_s + _GRACE_S
             response = await asyncio.wait_for(litellm.acompletion(**given), limit_s)
         except TimeoutError:
             raise RetryableError("no answer in time", sent="maybe") from None
         except Exception as error:
-            return self._after(error, exchange, time.perf_counter() - started_s)
+            return self._after(error, exchange)
         finally:
             _CURRENT.reset(token)
-        latency_s = time.perf_counter() - started_s
-        body = {
-            "choices": [
-                {"finish_reason": choice.finish_reason, "message": choice.message.model_dump()}
-                for choice in response.choices
-            ],
-            "usage": response.usage.model_dump() if getattr(response, "usage", None) else None,
-            "model": response.model,
-        }
-        return read_completion(body, latency_s, exchange.answer.status if exchange.answer else 200)
+        status = exchange.answer.status if exchange.answer else 200
+        return read_completion(response.model_dump(), status)
 
-    def _after(self, error: Exception, exchange: _Exchange, latency_s: float) -> Reply:
+    def _after(self, error: Exception, exchange: _Exchange) -> Reply:
         """Return the reply on the wire of a failed call, or raise its error."""
         if exchange.failure is not None:
             raise exchange.failure from None
@@ -146,7 +137,7 @@ class LitellmClient(Client):
         with contextlib.suppress(DataError):
             reply = read_raw_reply(read_json(answer), "")
             if reply.text:
-                return reply.model_copy(update={"usage": Usage(), "latency_s": latency_s})
+                return reply.model_copy(update={"usage": Usage()})
         raise malformed(answer.status, said) from None
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import time
-from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -25,8 +25,8 @@ from phyblock.models.costs import (
     Budget,
     Estimate,
     ModelBudget,
+    Reservation,
     cost_usd,
-    counted,
     estimate,
     map_entry,
     may_be_billed,
@@ -38,11 +38,6 @@ from phyblock.records.record import Call, Reply
 
 if TYPE_CHECKING:
     from phyblock.models.batch import BatchFiles
-
-_SCHEMA_PROVIDERS = ("predibase", "fireworks_ai", "lm_studio", "nebius", "databricks")
-"""Providers whose models all accept a schema according to litellm."""
-
-_NAP_S = 1.0
 
 
 @dataclass(frozen=True)
@@ -88,7 +83,7 @@ class Limits:
             async with self._admission:
                 while (wait_s := max(self._cooling_s(), self._next_s - self._clock.now())) > 0:
                     # In short waits, since the last server may be given up meanwhile.
-                    await self._clock.sleep(min(wait_s, _NAP_S))
+                    await self._clock.sleep(min(wait_s, 1.0))
                 await self._overall.acquire()
                 self._next_s = self._clock.now() + self._apart_s
             try:
@@ -137,10 +132,9 @@ class RetryPolicy:
         """Return the part of the server's requested wait that is followed [s]."""
         return min(getattr(error, "retry_after_s", None) or 0.0, self.max_retry_after_s)
 
-    def retrying(self, on_retry: Callable[[RetryableError, float], None]) -> AsyncRetrying:
-        """Return tenacity's loop for one request, which continues only after a RetryableError.
-
-        `on_retry` is called with the error and the wait [s] before each wait.
+    def retrying(self, model: str, report: Report) -> AsyncRetrying:
+        """Return tenacity's loop for one request, which continues only after a RetryableError; an
+        event of the model is reported before each wait.
         """
         failed_s: list[float] = []
 
@@ -164,7 +158,9 @@ class RetryPolicy:
                 lambda state: self.followed_s(error_of(state)),
             ),
             retry=retry_if_exception_type(RetryableError),
-            before_sleep=lambda state: on_retry(error_of(state), state.upcoming_sleep),
+            before_sleep=lambda state: report(
+                ModelEvent(model, "retry", str(error_of(state)), state.upcoming_sleep)
+            ),
             reraise=True,
         )
 
@@ -192,6 +188,7 @@ class Server:
     refusal: UnavailableError | None = None
 
 
+@dataclass(eq=False)
 class Servers:
     """Chooses among the servers of a model: the least loaded one that is not cooling down.
 
@@ -201,12 +198,9 @@ class Servers:
     server that is not used any more.
     """
 
-    def __init__(
-        self, servers: Sequence[Server], policy: RetryPolicy, report: Callable[[str], None]
-    ) -> None:
-        self.all = tuple(servers)
-        self._policy = policy
-        self._report = report
+    all: tuple[Server, ...]
+    policy: RetryPolicy
+    report: Callable[[str], None]
 
     def usable(self) -> list[Server]:
         """Return the servers that are not given up. Raises UnavailableError if there are none."""
@@ -217,11 +211,11 @@ class Servers:
 
     def cooling_s(self) -> float:
         """Return the seconds until a server may be asked; raises UnavailableError as `usable`."""
-        return max(0.0, min(s.cool_at_s for s in self.usable()) - self._policy.clock.now())
+        return max(0.0, min(s.cool_at_s for s in self.usable()) - self.policy.clock.now())
 
     def pick(self, failed: Server | None = None) -> Server:
         """Return the server to ask. One that just `failed` the request is the last choice."""
-        now_s = self._policy.clock.now()
+        now_s = self.policy.clock.now()
         return min(
             self.usable(),
             key=lambda s: (max(0.0, s.cool_at_s - now_s), s is failed, s.under_way, s.sent),
@@ -233,7 +227,7 @@ class Servers:
         A server is given up if it refuses every request, or fails many times in a row and has never
         answered, or not for as long as a request is retried.
         """
-        policy, now_s = self._policy, self._policy.clock.now()
+        policy, now_s = self.policy, self.policy.clock.now()
         server.was_heard |= error.status is not None
         is_down = error.sent in ("no", "lost") or error.status in _GATEWAY
         if is_down and sent_s >= server.cool_at_s:
@@ -254,7 +248,7 @@ class Servers:
         if isinstance(error, UnavailableError):
             is_first, server.refusal = server.refusal is None, error
             if is_first and any(other.refusal is None for other in self.all):
-                self._report(f"{server.name} is not used any more: {error}")
+                self.report(f"{server.name} is not used any more: {error}")
 
 
 @dataclass
@@ -297,16 +291,14 @@ class ChatModel:
         When cancelled while it waits, it gives up at once. When cancelled during a request, which
         is paid for, it returns the answer; a second cancellation gives that up too.
         """
-        is_keyed = self.cache is not None or self.journal is not None
-        key = reply_key(self.config, request) if is_keyed else ""
+        key = reply_key(self.config, request)
         if self.journal is not None and (answered := self.journal.kept(key)) is not None:
             return answered
         if self.cache is None:
             return await self._ask(request, key)
         async with self.cache.shared(key):
-            kept = self.cache.get(key)
-            if kept is not None:
-                return kept.model_copy(update={"cost_usd": self._cost_usd(kept)})
+            if (kept := self.cache.get(key)) is not None:
+                return kept.model_copy(update={"cost_usd": cost_usd(self.budget.tariff, kept)})
             reply = await self._ask(request, key)
             self.cache.put(key, self.config.id, reply)
             return reply
@@ -324,18 +316,11 @@ class ChatModel:
     async def _ask(self, request: Request, key: str) -> Reply:
         """Send until answered; however it ends, the billed cost is reported."""
         call = _Call(request, key, estimate(self.config, request))
-
-        def on_retry(error: RetryableError, wait_s: float) -> None:
-            self.report(ModelEvent(self.name, "retry", str(error), wait_s))
-
         try:
-            async for attempt in self.policy.retrying(on_retry):
-                with attempt:
-                    return await self._attempt(call)
+            return await self.policy.retrying(self.name, self.report)(self._attempt, call)
         except ModelError as error:
             error.billed_usd = call.billed_usd
             raise
-        raise AssertionError("tenacity neither returned nor raised")
 
     async def _attempt(self, call: _Call) -> Reply:
         """Send once, when limits and budget have room."""
@@ -354,7 +339,7 @@ class ChatModel:
                     # It would otherwise be sent again.
                     raise asyncio.CancelledError from None
 
-    async def _exchange(self, call: _Call, held: int | None) -> Reply:
+    async def _exchange(self, call: _Call, held: Reservation | None) -> Reply:
         """Write that a call is sent, send it, and write its end.
 
         A failure that may have been billed counts in full; a failure before anything is sent, and
@@ -365,13 +350,14 @@ class ChatModel:
         spent_usd: float | None = 0.0
         try:
             if self.journal is not None:
-                sample, most_usd = call.request.sample, self.budget.most_usd(call.expected)
+                sample, most_usd = call.request.sample, None if held is None else held.usd
                 written = await self.journal.sent(self.name, sample, call.key, most_usd)
                 if call.is_cancelled:
                     raise asyncio.CancelledError
             spent_usd = None
-            reply = counted(await self._complete(call), call.expected)
-            spent_usd = self._cost_usd(reply)
+            reply = await self._complete(call)
+            spent_usd = cost_usd(self.budget.tariff, reply)
+            reply = reply.model_copy(update={"cost_usd": spent_usd, "attempts": call.sent})
             self.budget.learn(call.expected, reply.usage)
         except ModelError as error:
             is_free = isinstance(error, UnavailableError) or not may_be_billed(error)
@@ -389,8 +375,7 @@ class ChatModel:
                 spent_usd = self.budget.settle(held, spent_usd)
                 call.billed_usd = (call.billed_usd or 0.0) + spent_usd
             if reply is not None:
-                known = {"billed_usd": call.billed_usd, "attempts": call.sent}
-                reply = reply.model_copy(update={"cost_usd": self._cost_usd(reply), **known})
+                reply = reply.model_copy(update={"billed_usd": call.billed_usd})
             if self.journal is not None and written is not None:
                 await self.journal.ended(written, spent_usd, reply)
         return reply
@@ -412,9 +397,6 @@ class ChatModel:
         server.was_heard, server.failures = True, 0
         return reply
 
-    def _cost_usd(self, reply: Reply) -> float | None:
-        return cost_usd(self.budget.tariff, reply)
-
 
 def takes_format(config: ModelConfig) -> bool:
     """True if a model is assumed to accept a JSON schema as `response_format`.
@@ -423,8 +405,7 @@ def takes_format(config: ModelConfig) -> bool:
     do; for all others litellm's map of models decides.
     """
     is_own = config.provider in DIRECT_PROVIDERS and bool(config.addresses)
-    is_known = is_own or config.provider in _SCHEMA_PROVIDERS
-    return is_known or bool(map_entry(config).get("supports_response_schema"))
+    return is_own or bool(map_entry(config).get("supports_response_schema"))
 
 
 def build_model(
@@ -448,9 +429,6 @@ def build_model(
         return open_baseline(config)
     if config.kind == "replay":
         return open_replay(config)
-    if not config.provider:
-        where, hint = f"model {config.name}", "for example openai/gpt-4o-2024-08-06"
-        raise SpecError(Problem(where, "needs a provider", "id", config.id, hint=hint))
     policy = policy or RetryPolicy()
     tariff = tariff_of(config)
     own = ModelBudget(budget or Budget(), tariff)
@@ -473,14 +451,14 @@ def build_model(
 
         assert batches is not None, "batches are kept in a run"
         return BatchModel(client=lambda http: client(config, http), files=batches, **shared)
-    each = [
+    each = tuple(
         Server(
             # Scheme, host and port: the rest of an address may hold a secret.
             "/".join(address.split("/")[:3]).lower() if address else config.provider,
             client(config.at(address)),
         )
         for address in config.addresses or (None,)
-    ]
+    )
     servers = Servers(each, policy, lambda text: report(ModelEvent(config.name, "notice", text)))
     limits = Limits(
         config.max_concurrency,

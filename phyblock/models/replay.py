@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -22,17 +23,16 @@ _NO_TOKENS = Usage(prompt_tokens=0, completion_tokens=0)
 _FREE = {"cost_usd": 0.0, "attempts": 0, "cached": False}
 
 
+@dataclass(frozen=True)
 class LocalModel:
     """A model that answers without a network and for free: recorded replies, or a rule.
 
     It uses no prompt and no picture, so none is made for it.
     """
 
-    needs_messages = False
-
-    def __init__(self, name: str, answer: Callable[[Request], Reply | None]) -> None:
-        self.name = name
-        self._answer = answer
+    name: str
+    answer: Callable[[Request], Reply | None]
+    needs_messages: bool = False
 
     async def ask(self, request: Request) -> Reply | None:
         """Return the answer to the request, or None if nothing was recorded.
@@ -40,7 +40,7 @@ class LocalModel:
         Raises the recorded error; DataError for an unreadable recording, or if an oracle lacks a
         candidate; SpecError for a track that a baseline has no rule for.
         """
-        reply = self._answer(request)
+        reply = self.answer(request)
         return None if reply is None else reply.model_copy(update=_FREE)
 
     async def aclose(self) -> None:

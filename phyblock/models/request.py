@@ -19,6 +19,7 @@ _MAGIC = (
     (b"\x89PNG\r\n\x1a\n", "image/png"),
     (b"\xff\xd8\xff", "image/jpeg"),
     (b"GIF8", "image/gif"),
+    (b"RIFF", "image/webp"),
 )
 
 
@@ -44,8 +45,6 @@ class Image:
         Raises DataError if the picture is not PNG, JPEG, GIF or WebP.
         """
         mime = next((name for magic, name in _MAGIC if self.data.startswith(magic)), "")
-        if self.data[:4] == b"RIFF" and self.data[8:12] == b"WEBP":
-            mime = "image/webp"
         if not mime:
             where, found = f"picture {self.label!r}", repr(self.data[:8])
             raise DataError(Problem(where, "is not a picture", "", found, "PNG, JPEG, GIF or WebP"))

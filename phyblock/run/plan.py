@@ -18,7 +18,7 @@ from phyblock.data.lookup import open_dataset
 from phyblock.data.official import match_published, recorded_models
 from phyblock.errors import Problem, SpecError
 from phyblock.files import bundled
-from phyblock.models.keys import api_key_status, server_address
+from phyblock.models.client import api_key_status, server_address
 from phyblock.models.model import takes_format
 from phyblock.models.request import Request
 from phyblock.records.files import MANIFEST, Manifest, read_manifest, suite_of
@@ -301,9 +301,7 @@ def check_models(models: Iterable[ModelConfig], source: YamlSource | None = None
             problems.append(Problem(where, message, f"{name}.id", config.id, allowed, hint))
             continue
         status = api_key_status(config)
-        if source is None and status.fault:
-            problems.append(Problem(where, status.fault, "", config.id))
-        elif source is None and status.is_needed and not status.is_set:
+        if source is None and status.is_needed and not status.key:
             variables = " or ".join(status.variables)
             hint = f"set {variables} in the environment, or exclude the model with --models"
             message = "needs an API key, and none is set"

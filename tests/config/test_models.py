@@ -17,7 +17,7 @@ from phyblock.config.models import (
     resolve_models,
 )
 from phyblock.errors import SpecError
-from phyblock.models.keys import server_address
+from phyblock.models.client import server_address
 from phyblock.registry import baseline_names
 from tests.config.tables import table, told
 from tests.fuzz.strategies import MODELS_FILES

@@ -6,6 +6,7 @@ import asyncio
 import itertools
 import re
 import threading
+import time
 from collections.abc import Callable, Collection, Coroutine, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -187,7 +188,7 @@ async def command(
     budget: Budget | None = None,
     told: list[ModelEvent] | None = None,
     policy: RetryPolicy = QUICK,
-    anew: bool = False,
+    recorded: Sequence[Request] = (),
 ) -> list[Reply | Exception]:
     """Ask all at once, as one command does; what stops the model stands where it was met."""
     cache = None if disk.cache is None else ReplyCache(disk.cache)
@@ -197,7 +198,7 @@ async def command(
         budget=budget,
         report=(told if told is not None else []).append,
         policy=policy,
-        batches=disk.files({one.sample for one in requests} if anew else (), len(requests)),
+        batches=disk.files({one.sample for one in recorded}, len(requests)),
     )
 
     async def ask(request: Request) -> Reply | Exception:
@@ -222,7 +223,12 @@ def run_command(*args: Any, **options: Any) -> list[Reply | Exception]:
 
 
 def look_up(server: BatchServer, lines: list[BatchLine], error: str) -> list[BatchLine]:
-    """Return the lines as the error of a batch that may exist tells a person to change them."""
+    """Return the lines as the error of a batch that may exist tells a person to change them.
+
+    A person comes later: the server has finished its calls.
+    """
+    while server.under_way:
+        time.sleep(0.001)
     found = re.search(r"\{.*?\}", error)
     assert found is not None, error
     line = BatchLine.model_validate_json(found[0])

@@ -125,7 +125,7 @@ def test_the_keys_of_kept_replies_stay(key):
 def test_a_reply_comes_back_whole_and_marked(tmp_path):
     with ReplyCache(tmp_path / "deep" / "replies.sqlite") as cache:
         assert cache.get("k") is None
-        assert cache.put(
+        cache.put(
             "k", "openai/m", REPLY.model_copy(update={"seed_sent": False, "text": "å\ud800 \x00"})
         )
         expected = REPLY.model_copy(
@@ -168,8 +168,7 @@ def test_a_row_that_is_no_reply_is_missing_and_is_overwritten(tmp_path, content)
         assert cache.get("whole") is not None
         cache.put("k", "openai/m", REPLY)
         assert cache.get("k") is not None
-    (text,) = said
-    assert "broken reply, requested again" in text
+    assert not said
 
 
 WRITER = """
@@ -220,4 +219,5 @@ def test_what_was_kept_survives_a_kill(tmp_path):
     process.stdout.close()
     with ReplyCache(path) as cache:
         assert all(cache.get(f"a-{n}") for n in range(last + 1))
-        assert cache.put("after", "openai/m", REPLY)
+        cache.put("after", "openai/m", REPLY)
+        assert cache.get("after")

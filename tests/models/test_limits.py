@@ -167,10 +167,9 @@ class Script:
         rules = RetryPolicy(clock=clock, **policy)
 
         async def main():
-            async for attempt in rules.retrying(lambda _, wait_s: self.told.append(wait_s)):
-                with attempt:
-                    return await self.send()
-            raise AssertionError
+            return await rules.retrying("m", lambda event: self.told.append(event.wait_s))(
+                self.send
+            )
 
         return asyncio.run(main())
 

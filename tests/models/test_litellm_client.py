@@ -16,9 +16,8 @@ from aiohttp import web
 from phyblock.config.models import ModelConfig, group_names, load_models
 from phyblock.config.suite import Suite
 from phyblock.errors import ModelError, RetryableError, UnavailableError
-from phyblock.models.client import HttpClient
+from phyblock.models.client import KEYLESS, HttpClient
 from phyblock.models.costs import map_entry
-from phyblock.models.keys import KEYLESS
 from phyblock.models.litellm_client import LitellmClient
 from phyblock.models.model import RetryPolicy
 from phyblock.models.request import Message

@@ -70,7 +70,7 @@ def ask_through(client, time, *, samples, width, was_heard=False):
     async def main():
         policy = RetryPolicy(clock=time.clock)
         server = Server("http://gone:1", client, was_heard=was_heard)
-        servers = Servers([server], policy, lambda _: None)
+        servers = Servers((server,), policy, lambda _: None)
         overall = asyncio.Semaphore(width)
         limits = Limits(width, overall, cooling_s=servers.cooling_s, clock=time.clock)
         config = ModelConfig(name="m", id="openai/m", api_base="http://gone:1/v1")
@@ -139,13 +139,13 @@ def test_a_server_that_has_answered_is_tried_for_as_long_as_the_policy_says(begi
 
 
 def servers_of(count, policy=None):
-    made = [Server(f"http://replica:{n}", None) for n in range(count)]
+    made = tuple(Server(f"http://replica:{n}", None) for n in range(count))
     return Servers(made, policy or RetryPolicy(), lambda _: None)
 
 
 def break_off(servers, server, error=REFUSED):
     for _ in range(2):
-        servers.failed(server, error, servers._policy.clock.now())
+        servers.failed(server, error, servers.policy.clock.now())
 
 
 @settings(max_examples=60)
@@ -180,7 +180,7 @@ def test_what_a_server_says_itself_and_what_is_late_is_no_outage(status):
     servers = servers_of(1)
     for _ in range(50):
         error = RetryableError("x", status=status, sent="answered" if status else "maybe")
-        servers.failed(servers.all[0], error, servers._policy.clock.now())
+        servers.failed(servers.all[0], error, servers.policy.clock.now())
     servers.failed(servers.all[0], SampleError("no key", status=400), 0.0)
     assert servers.cooling_s() == 0.0
 

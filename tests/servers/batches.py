@@ -70,6 +70,7 @@ class BatchServer(LocalServer):
         self.files: list[list[dict[str, Any]]] = []
         self.asked: Counter[str] = Counter()
         self.calls: list[str] = []
+        self.under_way = 0
         self.keys: set[str] = set()
         self.moment: Callable[[int, str], None] = lambda *_: None
         self._moments = itertools.count()
@@ -91,6 +92,13 @@ class BatchServer(LocalServer):
         """A handler that does a call's work, or what it meets; moments lie before and after."""
 
         async def handle(request: web.Request) -> web.StreamResponse:
+            self.under_way += 1
+            try:
+                return await answer(request)
+            finally:
+                self.under_way -= 1
+
+        async def answer(request: web.Request) -> web.StreamResponse:
             self.calls.append(kind)
             key = self.key_of(request)
             self.keys.add(key)
