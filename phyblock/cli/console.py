@@ -201,26 +201,18 @@ def jobs_option(default: int | None = None) -> Callable[..., Any]:
     )
 
 
-_CLUSTER_OPTIONS = (
-    click.option(
-        *("--ray", "ray_address"),
-        metavar="ADDRESS",
-        help="Run on this Ray cluster; local: one with N workers on this machine.",
-    ),
-    click.option(
-        "--shard",
-        callback=_shard,
-        metavar="I/N",
-        help="Run as shard I of N programs that share the work through OUT.shards.",
-    ),
-)
-
-
 def worker_options(jobs: int | None = None) -> Callable[[Any], Any]:
     """Return a decorator that adds the options of parallel commands."""
+    on_cluster = "Run on this Ray cluster; local: one with N workers on this machine."
+    as_shard = "Run as shard I of N programs that share the work through OUT.shards."
+    options = (
+        jobs_option(jobs),
+        click.option("--ray", "ray_address", metavar="ADDRESS", help=on_cluster),
+        click.option("--shard", callback=_shard, metavar="I/N", help=as_shard),
+    )
 
     def add(command: Any) -> Any:
-        for option in reversed((jobs_option(jobs), *_CLUSTER_OPTIONS)):
+        for option in reversed(options):
             command = option(command)
         return command
 

@@ -38,8 +38,6 @@ from phyblock.types import FAILURES
 _HEADLINE = "aov"
 _SHOWN_EVERY_S = 0.1
 """Minimum time between two updates of the display [s]."""
-_SPEED_OVER_S = 600.0
-"""Period over which the speed is measured to estimate the remaining time [s]."""
 
 
 @dataclass
@@ -89,7 +87,6 @@ class ProgressView:
         self._console = console
         self._tallies: dict[str, Tally] = {}
         self._started_s = self._last_line_s = now()
-        self._has_asked = False
         # Rich reads the environment on every access.
         self._is_terminal = console.is_terminal
         self._shown_s = -math.inf
@@ -102,7 +99,6 @@ class ProgressView:
             console=console,
             transient=True,
             disable=not self._is_terminal,
-            speed_estimate_period=_SPEED_OVER_S,
             get_time=now,
         )
 
@@ -125,20 +121,16 @@ class ProgressView:
                 for sample in known:
                     tally.add(sample)
         elif isinstance(event, SampleDone):
-            self._has_asked = True
             tally = self._tallies[event.record.model]
             tally.add(event.record)
             self._progress.advance(tally.task.id)
         elif isinstance(event, ModelEvent) and event.kind == "retry":
             tally = self._tallies[event.model]
             tally.retries += 1
-            self._has_asked = True
             if tally.retries == 1:
                 wait = f"waiting {round(event.wait_s, 1):g} s; more are counted as sent again"
                 self._print(f"{event.model}: {event.message}; {wait}")
         elif isinstance(event, ModelEvent):
-            # A batch that was sent has no calls in progress.
-            self._has_asked = True
             self._print(f"{event.model}: {event.message}")
         elif isinstance(event, ModelStopped):
             task = self._tallies[event.model].task
@@ -150,13 +142,11 @@ class ProgressView:
         if not isinstance(event, SampleDone) or self._now() - self._shown_s >= _SHOWN_EVERY_S:
             self.tick()
 
-    def tick(self, asks: bool = False) -> None:
-        """Print due lines; called several times a second. `asks`: calls are in progress."""
+    def tick(self) -> None:
+        """Print due lines; called several times a second."""
         self._shown_s = now_s = self._now()
-        self._has_asked |= asks
-        preparing = "" if self._has_asked else self._preparing(now_s)
         for tally in self._tallies.values():
-            self._progress.update(tally.task.id, facts=preparing or tally.facts)
+            self._progress.update(tally.task.id, facts=tally.facts)
         if not self._is_terminal and now_s - self._last_line_s >= LINE_EVERY_S:
             self._last_line_s = now_s
             self._print(self._line(now_s))
@@ -178,13 +168,8 @@ class ProgressView:
         with contextlib.suppress(OSError):
             self._console.print(Text(one_line(line), style=style))
 
-    def _preparing(self, now_s: float) -> str:
-        return f"Preparing scenes ... ({_duration(now_s - self._started_s)})"
-
     def _line(self, now_s: float) -> str:
         """Return the progress of the run as a line."""
-        if not self._has_asked:
-            return self._preparing(now_s)
         tallies = list(self._tallies.values())
         done = sum(int(tally.task.completed) for tally in tallies)
         total = sum(int(tally.task.total or 0) for tally in tallies)

@@ -126,8 +126,6 @@ def _print_summary(summary: Summary) -> None:
         print_table(console, table)
     for model, message, times in summary.failures[:_FAILURES]:
         console.print(one_line(f"{times:,} x {model}: {message}"), style="yellow")
-    if (others := len(summary.failures) - _FAILURES) > 0:
-        console.print(f"and {others:,} other messages", style="yellow")
     for sentence in summary.blind:
         console.print(sentence)
 
@@ -202,9 +200,7 @@ def _find(run: Path, sample: str) -> Record:
     matching = [sample] if sample in starts else [name for name in starts if sample in name]
     if len(matching) == 1:
         return next(iter(lines.at([starts[matching[0]]])))
-    many = f"holds {counted(len(matching), 'such sample')}"
-    message = many if matching else "holds no such sample"
-    allowed = some_of(matching or list(starts))
+    message, allowed = f"{len(matching):,} samples fit", some_of(matching or list(starts))
     raise StoreError(Problem(str(run / RECORDS), message, "sample", sample, allowed))
 
 
@@ -215,11 +211,8 @@ def _print_prompt(console: Console, run: Path, record: Record) -> None:
     if record.prompt is None:
         return
     console.print(f"\nPrompt ({record.prompt.template})", style="bold")
-    sent = (line for _, line in PromptLines(run) if line.sha256 == record.prompt.messages)
-    line = next(sent, None)
-    if line is None:
-        console.print("The text is not in the folder of the run.", style="dim")
-    for message in line.messages if line else ():
+    prompts = (line for _, line in PromptLines(run) if line.sha256 == record.prompt.messages)
+    for message in (message for line in prompts for message in line.messages):
         for part in message.parts:
             text = part if isinstance(part, str) else f"(picture {part.image})"
             console.print(f"{message.role}: {text}")
@@ -321,8 +314,7 @@ def bundle(run: Path, out: Path | None) -> None:
 
     console = make_console()
     path = bundle_run(run, out)
-    size = path.stat().st_size
-    console.print(f"{size / _MB:.1f} MB:" if size >= _MB else f"{size / 1000:.0f} kB:")
+    console.print(f"{path.stat().st_size / _MB:.2f} MB:")
     print_path(console, path)
 
 

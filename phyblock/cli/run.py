@@ -154,10 +154,11 @@ def _conclude(console: Console, folder: Path, result: RunResult, view: ProgressV
     if result.left:
         reason = f" ({result.stop.reason})" if result.stop else ""
         done = f"{result.settled:,} of {result.samples:,} samples are done{reason}"
-    from_cache = f" {view.cached:,} came from the reply cache (--no-cache asks again)."
-    cached = from_cache if view.cached else ""
+    cached = f" {view.cached:,} came from the reply cache (--no-cache asks again)."
     unanswered = f"; {result.unanswered}" if result.unanswered else ""
-    console.print(f"{done}. Cost so far: {view.cost_text}{unanswered}.{cached}")
+    console.print(
+        f"{done}. Cost so far: {view.cost_text}{unanswered}.{cached if view.cached else ''}"
+    )
     cause = result.stop.cause if result.stop else None
     if others := [model.name for model in read_manifest(folder).others]:
         also = f"The run also holds {some_of(others)}: name them with --models to see them again."
@@ -195,20 +196,15 @@ def print_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) ->
     cells = {heading: texts for heading, texts in cells.items() if set(texts) - {"0"}}
     headings = (Column("model", is_text=True), *map(Column, cells))
     lines = tuple(zip((row.model.name for row in asked), *cells.values(), strict=True))
-    notes: tuple[str, ...] = ()
     left = [row for row in rows if row.calls]
-    if left:
-        notes = (
-            "Tokens are estimates: texts by their words, pictures by the provider's rule, replies "
-            "of usual length. At most: every reply is as long as its limit allows.",
-        )
-    print_table(
-        console, TextTable(f"{plan.suite.name}: {', '.join(facts)}", headings, lines, notes)
+    note = (
+        "Tokens are estimates: texts by their words, pictures by the provider's rule, replies of "
+        "usual length. At most: every reply is as long as its limit allows."
     )
-    known = [row for row in left if row.cost_usd is not None]
-    prompts, replies = sum(r.prompt_usd for r in known), sum(r.reply_usd for r in known)
-    parts = f" (prompts {_dollars(prompts)}, replies {_dollars(replies)})" if known else ""
-    costs = [f"about {_dollars(prompts + replies)}{parts}"] if known or not left else []
+    title, notes = f"{plan.suite.name}: {', '.join(facts)}", (note,) if left else ()
+    print_table(console, TextTable(title, headings, lines, notes))
+    known = [row.cost_usd for row in left if row.cost_usd is not None]
+    costs = [f"about {_dollars(sum(known))}"] if known or not left else []
     if unknown := len(left) - len(known):
         costs.append(f"unknown cost of {counted(unknown, 'model')} (give a price in models.yaml)")
     console.print(f"{counted(sum(row.calls for row in left), 'call')}, {' and '.join(costs)}.")

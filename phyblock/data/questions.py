@@ -37,16 +37,13 @@ from phyblock.domain.question import (
     is_picture_option,
 )
 from phyblock.domain.scene import Block, Scene
-from phyblock.errors import DataError, Problem
 from phyblock.records.record import Line, decode
+from phyblock.text import some_of
 from phyblock.types import Background
 
 QUESTIONS_FILE = "questions.jsonl"
 _MOST_OPTIONS = 26
 _MOST_PICTURES = 2 + len(LETTERS)
-_FEW = 20
-"""Maximum number of faulty lines that are reported one by one."""
-_NO_SCENE = "names no scene of the data set"
 
 
 class StoredPose(Line, extra="ignore"):
@@ -294,16 +291,13 @@ def _wrong(field: str, message: str, allowed: str, found: object) -> Fault:
 def scene_of(name: str, scenes: Mapping[str, Scene], where: str) -> Scene:
     """Return the scene of a question. Raises DataError if the data set does not have it."""
     if name not in scenes:
-        allowed = f"one of the {len(scenes)} scenes of the data set"
-        report([_wrong("scene_id", _NO_SCENE, allowed, name)], where)
+        message, allowed = "names no scene of the data set", some_of(list(scenes))
+        report([_wrong("scene_id", message, allowed, name)], where)
     return scenes[name]
 
 
 def read_questions(folder: Path, scenes: Dataset) -> QuestionSet:
-    """Return all questions of a folder, about these scenes. Raises DataError with all problems.
-
-    If most are about scenes of another data set, only that is reported.
-    """
+    """Return all questions of a folder, about these scenes. Raises DataError with all problems."""
     known = {task.scene.id: task.scene for task in scenes.tasks}
 
     adapter = TypeAdapter(StoredQuestion)
@@ -315,14 +309,5 @@ def read_questions(folder: Path, scenes: Dataset) -> QuestionSet:
         return QuestionTask(stored.about(scene))
 
     path = folder / QUESTIONS_FILE
-    try:
-        tasks = read_lines(path, read_set(path), "question", read, lambda task: task.key)
-    except DataError as error:
-        elsewhere = [one for one in error.problems if one.message == _NO_SCENE]
-        if len(elsewhere) < max(_FEW, len(error.problems) / 2):
-            raise
-        message = "asks about scenes of another data set"
-        found, allowed = f"the data set {scenes.name}", "questions about its scenes"
-        hint = "make questions about it, or name the data set that they are about"
-        raise DataError(Problem(str(path), message, "", found, allowed, hint)) from error
+    tasks = read_lines(path, read_set(path), "question", read, lambda task: task.key)
     return QuestionSet(folder.name, folder, tuple(tasks))

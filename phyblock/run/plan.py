@@ -259,9 +259,7 @@ def _planned_models(
 
 
 def to_config(name: str, known: ModelConfig, suite: Suite) -> ModelConfig:
-    """Return a model with the settings of a suite. Raises SpecError if it sets its own response
-    format and the suite asks for JSON.
-    """
+    """Return a model with the settings of a suite."""
     if known.kind != "litellm":
         return known
     limits = suite.limits.model_dump(include={"timeout_s", "max_concurrency"})
@@ -270,11 +268,6 @@ def to_config(name: str, known: ModelConfig, suite: Suite) -> ModelConfig:
         config = config.at(server_address(config.id))
     sends = suite.answer_format == "json_schema" and config.response_format != "never"
     sends = sends and (config.response_format == "always" or takes_format(config))
-    if sends and "response_format" in config.extra_body:
-        message = "sets its own response_format, but the suite asks for one"
-        hint = "remove it from extra_body, or set response_format: never to send it anyway"
-        field = "extra_body.response_format"
-        raise SpecError(Problem(f"model {config.name}", message, field, hint=hint))
     return config.model_copy(update={"response_format": "always" if sends else "never"})
 
 
