@@ -241,15 +241,12 @@ class Track(ABC):
 
         Counts are empty if their measures do not count the sample.
         """
+        added = (measure.counted for measure in added_measures(self.name))
         return {
             one.name: tuple(map(float, one.sample(item, record) or ()))
-            for one in self._counted
+            for one in (*self.counted, *added)
             if one.sample is not None
         }
-
-    @functools.cached_property
-    def _counted(self) -> tuple[SampleCounts, ...]:
-        return (*self.counted, *(one.counted for one in added_measures(self.name)))
 
     async def judge_apart(self, item: Any, text: str | None, _earlier: Record | None) -> Judgement:
         """Return the result of `judge`, computed in another process if it takes long.

@@ -186,13 +186,11 @@ class LocalShop(Workshop):
     So a coroutine of a track can run to its end without an event loop, in any thread.
     """
 
-    def __init__(self, folder: Path | None = None) -> None:
-        super().__init__(1, folder)
-        self._engine_lock = threading.Lock()
+    _one_at_a_time = threading.Lock()
 
     async def work_out(self, work: Callable[[], _Result]) -> _Result:
         """Return the result of `work`; one at a time, as a physics engine requires."""
-        with self._engine_lock:
+        with self._one_at_a_time:
             return work()
 
     async def _image(self, drawing: Drawing) -> Image:
