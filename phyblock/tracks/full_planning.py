@@ -12,7 +12,7 @@ import numpy as np
 from phyblock.config.validation import PictureControls
 from phyblock.data.official import official_prompt
 from phyblock.domain.scene import AssemblyTask, Block, CandidateSet, Kind, Plan, Scene
-from phyblock.errors import DataError, Problem, SpecError
+from phyblock.errors import DataError, Problem
 from phyblock.files import bundled
 from phyblock.parsing.plan import ParsedPlan, parse_plan, plan_form
 from phyblock.parsing.text import AnswerForm
@@ -224,11 +224,6 @@ class FullPlanning(SceneTrack):
         """Return the official prompt, or a template."""
         if self.suite.prompt != "official":
             return super().open_prompt()
-        if self.suite.dataset.format != "official":
-            message = "the official prompt is read from the official data set"
-            hint = "set dataset.format to official and dataset.path to its checkout"
-            where = str(self.suite.files.path)
-            raise SpecError(Problem(where, message, "prompt", "official", hint=hint))
         return OfficialPrompt(official_prompt(self.suite.files.dataset))
 
     def json_form(self, item: AssemblyTask) -> AnswerForm[list[int]]:
