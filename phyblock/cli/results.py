@@ -24,7 +24,7 @@ from phyblock.cli.console import (
     shown_path,
 )
 from phyblock.errors import DataError, Problem, SpecError, StoreError
-from phyblock.results.text import REPORT_FILE, TABLES, Summary, kept_summary, sources
+from phyblock.results.text import REPORT_FILE, TABLES, Summary
 from phyblock.text import counted, one_line, some_of
 
 if TYPE_CHECKING:
@@ -88,36 +88,20 @@ def _check_names(run: Path, names: Sequence[str], known: Iterable[str], noun: st
         raise SpecError(Problem(str(run), f"has no such {noun}", "--only", found, allowed))
 
 
-def show_tables(
-    folder: Path,
-    data: Path | None = None,
-    *,
-    page: bool = True,
-    kept: bool = False,
-    keep: bool = False,
-) -> Path:
-    """Write the tables and the page of a run folder; with `kept`, only if they are out of date.
+def show_tables(folder: Path, data: Path | None = None, *, page: bool = True) -> Path:
+    """Write the tables and the page of a run folder, and print the summary.
 
-    Prints the summary and, with `keep` and for a complete run, stores it in the folder. Returns the
-    path of the page, or of the folder of tables without a page.
+    Returns the path of the page, or of the folder of tables without a page.
     """
-    wanted = REPORT_FILE if page else TABLES
-    if kept and (summary := kept_summary(folder, wanted)) is not None:
-        _print_summary(summary)
-        return folder / wanted
     from phyblock.results.tables import summary_of, write_tables
 
-    made_of, written = sources(folder), write_tables(folder)
-    summary, made = summary_of(written.run), [*written.files]
-    _print_summary(summary)
+    written = write_tables(folder)
+    _print_summary(summary_of(written.run))
     if page:
-        from phyblock.web.report import report_files, write_report
+        from phyblock.web.report import write_report
 
         write_report(written, data)
-        made += report_files(folder).values()
-    if keep:
-        summary.keep(folder, made_of, made)
-    return folder / wanted
+    return folder / (REPORT_FILE if page else TABLES)
 
 
 def _print_summary(summary: Summary) -> None:

@@ -42,8 +42,8 @@ from phyblock.cli.progress import ProgressView
 from phyblock.cli.results import show_tables
 from phyblock.config.models import load_models
 from phyblock.files import OutFolder
-from phyblock.records.files import read_manifest
-from phyblock.results.text import NO_VALUE, REPORT_FILE, TABLES, Column, TextTable, kept_summary
+from phyblock.records.files import RECORDS, read_manifest
+from phyblock.results.text import NO_VALUE, REPORT_FILE, TABLES, Column, TextTable
 from phyblock.run.estimate import Estimate, estimate, may_bill
 from phyblock.run.manifest import code_versions
 from phyblock.run.plan import (
@@ -103,14 +103,14 @@ def run(
     known = load_models(find_models_file(models_file, loaded.files.path))
     plan = make_plan(loaded, known, only=models, limit=limit)
     folder = out or plan.folder_in(Path("results"))
-    wanted = TABLES if no_report else REPORT_FILE
+    made = folder / (TABLES if no_report else REPORT_FILE)
     held = held_run(folder, plan.manifest)
     # Nothing is left to ask, and existing outputs stay.
     is_as_it_was = (
         held is not None
         and not retry_failed
         and held.model_copy(update={"created": plan.manifest.created}) == plan.manifest
-        and kept_summary(folder, wanted) is not None
+        and _is_newest(folder, made)
     )
     if held is not None and not is_as_it_was and not dry_run:
         from phyblock.web.report import files_of
@@ -140,10 +140,18 @@ def run(
         session = Session(plan, folder, view, **asks)
         result = completed(session, _SIGNALS, view.tick)
     gc.freeze()
-    made = show_tables(folder, page=not no_report, kept=True, keep=not result.left)
+    if result.left or not (is_as_it_was and _is_newest(folder, made)):
+        show_tables(folder, page=not no_report)
     code = _conclude(console, folder, result, view)
     print_path(console, made)
     return code
+
+
+def _is_newest(folder: Path, made: Path) -> bool:
+    """True if phyblock made the tables or page of a run folder after its last record."""
+    ends = [path.stat().st_mtime_ns for path in (folder / RECORDS, made) if path.exists()]
+    is_own = bool(OutFolder(folder).names(made.name))
+    return is_own and len(ends) == 2 and ends[0] <= ends[1]
 
 
 def _conclude(console: Console, folder: Path, result: RunResult, view: ProgressView) -> int:

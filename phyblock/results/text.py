@@ -4,21 +4,15 @@ from __future__ import annotations
 
 import functools
 import itertools
-import json
 import math
 import re
 from collections.abc import Callable, Collection, Hashable, Iterable, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import jinja2
 
-from phyblock.files import OutFolder, digest_of_file, load_json, read_bytes
-from phyblock.records.files import MANIFEST, PROMPTS, RECORDS, STOPPED
-from phyblock.registry import has_additions
 from phyblock.text import csv_cell, one_line
 
 if TYPE_CHECKING:
@@ -98,12 +92,6 @@ class TextTable:
             "rows": self.rows,
             "notes": self.notes,
         }
-
-    @classmethod
-    def of_plain(cls, table: Mapping[str, Any]) -> TextTable:
-        """Return the table of plain values."""
-        columns = tuple(Column(*column) for column in table["columns"])
-        return cls(table["caption"], columns, tuple(map(tuple, table["rows"])), table["notes"])
 
     def without(self, names: Collection[str]) -> TextTable:
         """Return the table without the columns of these names."""
@@ -264,8 +252,6 @@ def to_latex(table: TextTable, label: str) -> str:
 TABLES = "tables"
 """The folder of tables in the folder of a run."""
 REPORT_FILE = "report.html"
-SUMMARY = ".summary.json"
-"""The file in the folder of a run that keeps its summary."""
 
 
 @dataclass(frozen=True)
@@ -279,48 +265,3 @@ class Summary:
     tables: tuple[TextTable, ...] = ()
     blind: tuple[str, ...] = ()
     failures: tuple[tuple[str, str, int], ...] = ()
-
-    def keep(self, folder: Path, made_of: list[str], files: Iterable[Path]) -> None:
-        """Write the summary with the `sources` of a run and the files made from them."""
-        kept = {
-            "made_of": made_of,
-            "files": [path.relative_to(folder).as_posix() for path in files],
-            "tables": [table.plain() for table in self.tables],
-            "blind": self.blind,
-            "failures": self.failures,
-        }
-        OutFolder(folder).write({SUMMARY: json.dumps(kept)})
-
-
-def sources(folder: Path) -> list[str]:
-    """Return the sources of tables and page: version and last change of phyblock, digests of the
-    files of the run; empty if one cannot be read.
-    """
-    names = (MANIFEST, RECORDS, PROMPTS, STOPPED)
-    with suppress(OSError, ValueError):
-        code = (path for path in Path(__file__).parents[1].rglob("*") if path.suffix != ".pyc")
-        changed_ns = max(path.stat().st_mtime_ns for path in code if path.is_file())
-        digests = (digest_of_file(folder / name) for name in names)
-        return [version("phyblock"), str(changed_ns), *digests]
-    return []
-
-
-def kept_summary(folder: Path, needed: str) -> Summary | None:
-    """Return the kept summary; None if the run or phyblock has changed, plugins are active, a file
-    is missing, or `needed` was not made.
-    """
-    try:
-        if has_additions():
-            return None
-        kept = load_json(read_bytes(folder / SUMMARY))
-        is_there = all((folder / name).is_file() for name in kept["files"])
-        made_of = sources(folder)
-        if not is_there or not made_of or kept["made_of"] != made_of:
-            return None
-        if not any(name.startswith(needed) for name in kept["files"]):
-            return None
-        tables = tuple(TextTable.of_plain(table) for table in kept["tables"])
-        failures = tuple((model, message, times) for model, message, times in kept["failures"])
-        return Summary(tables, tuple(kept["blind"]), failures)
-    except (OSError, ValueError, KeyError, TypeError, AttributeError):
-        return None

@@ -10,7 +10,7 @@ from phyblock.files import OutFolder, digest_of_file
 from phyblock.records.files import MANIFEST, PROMPTS, RECORDS, STOPPED, read_stopped
 from phyblock.results.load import Run
 from phyblock.results.tables import TablesWritten, coverage_frame, table_files
-from phyblock.results.text import REPORT_FILE, SUMMARY
+from phyblock.results.text import REPORT_FILE
 from phyblock.tracks.base import kind_of
 from phyblock.types import WITHOUT_REPLY
 from phyblock.web.board import (
@@ -87,8 +87,8 @@ def write_report(written: TablesWritten, data: Path | None = None) -> Path:
 
 
 def files_of() -> tuple[str, ...]:
-    """Return the files that a run folder may get: tables, summary and page."""
-    return (*table_files(), SUMMARY, *_PAGE)
+    """Return the files that a run folder may get: tables and page."""
+    return (*table_files(), *_PAGE)
 
 
 def report_files(folder: Path) -> dict[str, Path]:
