@@ -253,7 +253,7 @@ def serve(orders: socket.socket) -> None:
     _litellm()
     suite_model()
     known_records()
-    latex_template("table.tex.j2")
+    latex_template()
     gc.collect()
     gc.freeze()
     while True:

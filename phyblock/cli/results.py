@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import click
 from rich.console import Console
@@ -39,17 +39,14 @@ _FAILURES = 4
 @run_argument
 @click.option("--print", "prints", is_flag=True, help="Print all tables; write nothing.")
 @click.option("--only", "names", multiple=True, metavar="NAME", help="With --print: this table.")
-@click.option("--paper", is_flag=True, help="With --print: published, ours and difference.")
 @click.option(
     *("--format", "form"),
-    type=click.Choice(["text", "md", "tex"]),
+    type=click.Choice(["text", "tex"]),
     default="text",
     help="With --print: how.",
 )
 @data_option
-def report(
-    run: Path, prints: bool, names: tuple[str, ...], paper: bool, form: str, data: Path | None
-) -> None:
+def report(run: Path, prints: bool, names: tuple[str, ...], form: str, data: Path | None) -> None:
     """Write tables and report.html of the folder RUN again; with --print, print its tables.
 
     Uses only the files of the run: no model, no network. Draws scenes if the data set is
@@ -60,24 +57,17 @@ def report(
         print_path(console, show_tables(run, data))
         return
     from phyblock.results.load import load_run
-    from phyblock.results.paper import PAPER_TABLES, beside_paper
     from phyblock.results.tables import make_tables, table_names
-    from phyblock.results.text import to_latex, to_markdown
+    from phyblock.results.text import to_latex
 
     loaded = load_run(run)
-    if paper:
-        made = {f"paper{n}": beside_paper(loaded, n) for n in PAPER_TABLES}
-        tables = {name: table for name, table in made.items() if table is not None}
-    else:
-        _check_names(run, names, table_names(loaded), "table")
-        tables = make_tables(loaded, names or table_names(loaded))
+    _check_names(run, names, table_names(loaded), "table")
+    tables = make_tables(loaded, names or table_names(loaded))
     if not tables:
-        console.print("No model of the run has a row in the paper's tables for these scenes.")
+        console.print("The run has no numbers for this table.")
     for name, table in tables.items():
         if form == "text":
             print_table(console, table)
-        elif form == "md":
-            click.echo(to_markdown(table))
         else:
             click.echo(to_latex(table, f"phyblock-{name}"))
 
@@ -211,7 +201,7 @@ def _print_prompt(console: Console, run: Path, record: Record) -> None:
 @models_option("Only these models; of two runs, A of the first.")
 @click.option("--track", metavar="NAME", default="", show_default="the first in both")
 @click.option("--measure", metavar="NAME", default="", show_default="the headline measure")
-@click.option("--out", type=UserPath(), metavar="DIR", help="Folder for CSV, Markdown and LaTeX.")
+@click.option("--out", type=UserPath(), metavar="DIR", help="Folder for CSV and LaTeX.")
 def compare(
     run: Path, other: Path | None, models: Sequence[str], track: str, measure: str, out: Path | None
 ) -> None:
@@ -247,7 +237,6 @@ def compare(
 @click.command()
 @run_argument
 @click.option("--only", "names", multiple=True, metavar="NAME", help="Only this one; repeatable.")
-@models_option("Only these models.")
 @click.option(
     "--width",
     type=click.FloatRange(60, 400),
@@ -255,15 +244,12 @@ def compare(
     metavar="MM",
     help="Width in millimeters; a column of a two-column paper has 85.",
 )
-@click.option("--font", type=click.Choice(["sans", "serif"]), default="sans", help="Typeface.")
 @click.option("--no-title", is_flag=True, help="Leave the title to the caption.")
 @click.option("--out", type=UserPath(), metavar="DIR", help="Folder. [default: RUN/paper]")
 def figures(
     run: Path,
     names: tuple[str, ...],
-    models: Sequence[str],
     width: float,
-    font: Literal["sans", "serif"],
     no_title: bool,
     out: Path | None,
 ) -> None:
@@ -272,13 +258,12 @@ def figures(
 
     Draws all figures that the run has numbers for, or those named with --only.
     """
-    from phyblock.results.figures import Look, figures_of, write_paper_figures
-    from phyblock.results.load import load_run, of_models
+    from phyblock.results.figures import figures_of, write_paper_figures
+    from phyblock.results.load import load_run
 
-    loaded = of_models(load_run(run), models)
+    loaded, console = load_run(run), make_console()
     _check_names(run, names, figures_of(loaded), "figure")
-    look = Look(width / 25.4, font, not no_title)
-    drawn, console = write_paper_figures(loaded, names, look, out), make_console()
+    drawn = write_paper_figures(loaded, names, out, width_in=width / 25.4, titled=not no_title)
     for file in drawn:
         print_path(console, file)
     if not drawn:

@@ -61,7 +61,7 @@ from phyblock.tracks.measures import SCORED_BY, Cell, Measure, in_unit
 
 _LEVEL = 1 - CONFIDENCE
 _KEYS = ["scene", "item", "seed", "variant"]
-_JOINT = ("p_holm", "verdict", "detectable", "detectable_holm")
+_JOINT = ("p_holm", "verdict", "detectable_holm")
 """Columns of `Comparison.table` that depend on all of its tests."""
 
 
@@ -289,9 +289,9 @@ class Comparison:
 
     `table` has one row per pair and part of the track (level, category of questions): a, b, part,
     value_a, value_b, difference (a minus b), se, lo, hi [all in `unit`], p, p_holm (corrected for
-    all rows), verdict, detectable (the difference that a single test finds in four of five cases)
-    and detectable_holm (the same at the first step of Holm's correction) [in `unit`; NaN where that
-    exceeds the most that values can differ by], better, worse and same (samples on which a has the
+    all rows), verdict, detectable_holm (the difference that is found in four of five cases at the
+    first step of Holm's correction) [in `unit`; NaN where that exceeds the most that values can
+    differ by], better, worse and same (samples on which a has the
     better, worse, same value), n_samples, n_scenes, n_clusters. `ranks`, if all pairs of a run were
     compared, has one row per ranked model: model, value, best and worst rank. `name` and `unit` are
     those of the values, `how` describes them.
@@ -392,17 +392,12 @@ def compare(
     n_tests = int(table["p"].notna().sum())
     table["p_holm"] = holm(table["p"])
     table["verdict"] = [_verdict(row, measure, n_tests) for row in table.to_dict("records")]
-    for name, level in (("detectable", _LEVEL), ("detectable_holm", _LEVEL / max(n_tests, 1))):
-        spread = table["se"], table["n_clusters"]
-        table[name] = detectable(*spread, level, measure.most_apart)
+    level, spread = _LEVEL / max(n_tests, 1), (table["se"], table["n_clusters"])
+    table["detectable_holm"] = detectable(*spread, level, measure.most_apart)
     how = [what.how]
     for run in runs:
         if words := run.presentation(what.track):
             how.append(f"Run {run.path.name}: {', '.join(words)}.")
-    readers = {run.path.name: run.manifest.versions.get("readers", "1") for run in runs}
-    if len(set(readers.values())) > 1:
-        names = ", ".join(f"{name} by readers {version}" for name, version in readers.items())
-        how.append(f"Replies were read: {names}; phyblock score reads a run with those of today.")
     ranks = _ranks(table, measure, ranked)
     return Comparison(table, ranks, measure.heading, measure.unit, " ".join(how))
 
@@ -506,11 +501,9 @@ def _notes(found: Comparison) -> Iterator[str]:
             f"{counted(most['n_clusters'], 'base scene')}; scenes that share one are not taken as "
             "independent."
         )
-        single = number(table["detectable"].median())
         yield (
-            f"“finds”: the difference that this comparison would find in {POWER:.0%} of cases; a "
-            f"single test, in the median, {single}. {NO_VALUE}: none that is possible, or no "
-            "sample differs."
+            f"“finds”: the difference that this comparison would find in {POWER:.0%} of cases. "
+            f"{NO_VALUE}: none that is possible, or no sample differs."
         )
     yield (
         f"p values are corrected for {table['p'].notna().sum()} comparisons (Holm); “cannot tell” "
@@ -533,7 +526,7 @@ def ranks_view(found: Comparison) -> TextTable:
 
 
 def write_comparison(found: Comparison, folder: Path) -> tuple[Path, ...]:
-    """Write comparison (.csv, .md, .tex) and ranks.csv into `folder`.
+    """Write comparison (.csv, .tex) and ranks.csv into `folder`.
 
     Raises StoreError if they cannot be written.
     """

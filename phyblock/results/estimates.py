@@ -253,14 +253,6 @@ def _over_seeds(each: Floats) -> tuple[NDArray[np.intp], Floats, Floats, Floats,
     return count, mean, sd, np.fmin.reduce(each), np.fmax.reduce(each)
 
 
-def all_estimates(run: Run) -> pd.DataFrame:
-    """Return one long frame of every track, measure, way of counting, model and cell of the run."""
-    parts = [track_estimates(run, track).assign(track=track) for track in run.design.suite.tracks]
-    known = [part for part in parts if len(part)]
-    columns = ["track", *ESTIMATE_COLUMNS]
-    return pd.concat(known, ignore_index=True)[columns] if known else pd.DataFrame(columns=columns)
-
-
 def track_notes(run: Run, track: str) -> tuple[str, ...]:
     """Return sentences that explain how the values of a track are counted."""
     kind, suite = kind_of(track), run.design.suite

@@ -12,9 +12,8 @@ import pandas as pd
 from phyblock.files import OutFolder
 from phyblock.records.files import RecordLines, read_prompts, record_types
 from phyblock.records.record import PictureMark, PromptMessage, Record
-from phyblock.results.load import TOKENS, Run, track_measures
+from phyblock.results.load import TOKENS, Run
 from phyblock.results.text import to_csv
-from phyblock.tracks.measures import SCORED_BY
 
 _TYPES = {
     **dict.fromkeys(("sample", "track", "model", "scene"), "string"),
@@ -34,9 +33,8 @@ def export_frame(run: Run) -> pd.DataFrame:
     """Return one row per sample: prompt, model, reply, parsed answer and counts.
 
     Counts are `tp_<setting>`, `fp_<setting>`, `fn_<setting>` of the headline matcher, all levels by
-    the `aov` criterion (for episodes over placed blocks); `count_<name>_<column>` are those stored
-    in records. Columns have the same types for any rows; values that a track does not have are
-    missing. `levels`, `parents` and `plan` are lists.
+    the `aov` criterion (for episodes over placed blocks). Columns have the same types for any rows;
+    values that a track does not have are missing. `levels`, `parents` and `plan` are lists.
     """
     types = {**dict.fromkeys(_TEXTS, "string"), "plan": "object"}
     for record in record_types():
@@ -51,15 +49,6 @@ def export_frame(run: Run) -> pd.DataFrame:
     rows = [_row(run, one, prompts) for one in RecordLines(run.path).at(run.records["start"])]
     for name, kind in types.items():
         frame[name] = pd.Series([row.get(name) for row in rows], frame.index, dtype=kind)
-    for track in run.design.suite.tracks:
-        for counted in dict.fromkeys(measure.counted for measure in track_measures(track)):
-            held = run.counts.get((track, counted.name))
-            for n, column in enumerate(counted.columns if counted.sample is not None else ()):
-                key = f"count_{counted.name}_{column}"
-                if key not in frame:
-                    frame[key] = pd.Series(pd.NA, frame.index, dtype="Float64")
-                if held is not None:
-                    frame.loc[held["row"], key] = held.iloc[:, 1 + len(SCORED_BY) + n].to_numpy()
     return frame
 
 

@@ -7,11 +7,10 @@ import math
 import os
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from textwrap import wrap
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -27,7 +26,7 @@ from phyblock.results.compare import (
 from phyblock.results.estimates import Headline
 from phyblock.results.load import Run
 from phyblock.results.tables import coverage_frame, filled
-from phyblock.results.text import between, latex, level_name, number
+from phyblock.results.text import between, level_name, number
 from phyblock.text import counted
 from phyblock.tracks.base import kind_of
 from phyblock.tracks.measures import in_unit
@@ -51,9 +50,6 @@ COLUMN_IN = 3.35
 """Width of one of its columns."""
 PAPER = "paper"
 """Default folder of figures for papers, in a run's folder."""
-Font = Literal["sans", "serif"]
-_FONTS = {"sans": ("sans-serif", "DejaVu Sans"), "serif": ("serif", "STIXGeneral")}
-"""Generic family and its font; matplotlib includes both."""
 _ROW_IN, _TITLE_IN, _LEGEND_IN = 0.19, 0.22, 0.2
 _LETTER_IN = 0.062
 """Width of a wide letter in a legend."""
@@ -65,28 +61,16 @@ _FORMATS: dict[str, tuple[int, dict[str, Any]]] = {
 """Dots per inch and metadata; without a date, the same numbers give the same bytes."""
 
 
-@dataclass(frozen=True)
-class Look:
-    """Width [inches], font, and a flag for titles inside figures."""
-
-    width_in: float = WIDTH_IN
-    font: Font = "sans"
-    titled: bool = True
-
-
 @contextmanager
-def _styled(look: Look) -> Iterator[None]:
+def _styled(width_in: float) -> Iterator[None]:
     """Apply the project's style to figures, with matplotlib's font list in phyblock's cache."""
     os.environ.setdefault("MPLCONFIGDIR", str(cache_dir() / "matplotlib"))
     import matplotlib as mpl
 
-    family, font = _FONTS[look.font]
     with mpl.rc_context():
         mpl.rcdefaults()
         mpl.rc_file(_STYLE, use_default_template=False)
-        size = (look.width_in, look.width_in)
-        chosen = {"font.family": [family], f"font.{family}": [font], "figure.figsize": size}
-        mpl.rcParams.update(chosen)  # type: ignore[arg-type]
+        mpl.rcParams["figure.figsize"] = (width_in, width_in)
         yield
 
 
@@ -208,7 +192,7 @@ def levels(run: Run, *, track: str) -> Figure | None:
     if measure.unit == "%":
         ax.set_ylim(0, 102)
     more = f"; the other {len(models) - _NAMED} pale" if len(models) > _NAMED else ""
-    parts = "level" if columns[0].heading.startswith("Level") else "category"
+    parts = "category" if kind_of(track).report().part_names else "level"
     title, how = f"{kind_of(track).title}: {measure.heading} by {parts}", "the best of all first"
     return _finished(figure, run, title, f"{how}{more}", grid="y", reverse=True)
 
@@ -333,30 +317,35 @@ def figures_of(run: Run) -> dict[str, Callable[[Run], Figure | None]]:
 
 
 def write_paper_figures(
-    run: Run, names: Sequence[str], look: Look, out: Path | None = None
+    run: Run,
+    names: Sequence[str] = (),
+    out: Path | None = None,
+    *,
+    width_in: float = WIDTH_IN,
+    titled: bool = True,
 ) -> tuple[Path, ...]:
     """Draw figures for a paper into `out`, else into `paper/` of the run's folder.
 
-    Each is NAME.pdf, NAME.svg and NAME.png, with its caption NAME.txt, and NAME.tex, a float that
-    includes it. Without names, all figures that have numbers are drawn. The same records give the
-    same bytes. Raises StoreError for a folder that cannot be written and, before anything is drawn,
+    Each is NAME.pdf, NAME.svg and NAME.png, with its caption NAME.txt. Without names, all figures
+    that have numbers are drawn. The same records give the same bytes. Raises StoreError for a
+    folder that cannot be written and, before anything is drawn,
     naming every file that would be overwritten and that phyblock did not write.
     """
     makers = figures_of(run)
     wanted = list(names) or list(makers)
     folder = OutFolder(out or run.path)
     below = f"{PAPER}/" if out is None else ""
-    endings = (*_FORMATS, "txt", "tex")
+    endings = (*_FORMATS, "txt")
     folder.check(f"{below}{name}.{ending}" for name in wanted for ending in endings)
     files: list[Path] = []
-    with _styled(look):
+    with _styled(width_in):
         for name in wanted:
             figure = makers[name](run)
             if figure is None:
                 continue
-            if look.titled:
+            if titled:
                 title = str(figure.get_label()).partition("\n")[0]
-                lines = wrap(title, int(look.width_in * 11))
+                lines = wrap(title, int(width_in * 11))
                 figure.set_figheight(figure.get_figheight() + _TITLE_IN * len(lines))
                 figure.suptitle("\n".join(lines), x=0.01, ha="left")
             made: dict[str, bytes | str] = {}
@@ -366,19 +355,16 @@ def write_paper_figures(
                 made[f"{name}.{ending}"] = drawn.getvalue()
                 # Laid out once: the next formats use the layout of the first.
                 figure.set_layout_engine("none")
-            made |= _captions(run, name, figure)
+            made[f"{name}.txt"] = _caption(run, figure)
             files += folder.write({f"{below}{file}": data for file, data in made.items()})
     return tuple(files)
 
 
-def _captions(run: Run, name: str, figure: Figure) -> dict[str, str]:
-    """Return the caption as text, and a LaTeX float, which spans both columns if it is wide."""
+def _caption(run: Run, figure: Figure) -> str:
+    """Return the caption as a line of text."""
     title, _, subtitle = str(figure.get_label()).partition("\n")
     tracks = run.design.suite.tracks
     words = [word for track in tracks for word in run.presentation(track)]
     sentences = [title, subtitle[:1].upper() + subtitle[1:]]
     sentences += [", ".join(dict.fromkeys(words))]
-    text = " ".join(f"{sentence}." for sentence in sentences if sentence)
-    star = "*" if _is_wide(figure) else ""
-    float_text = latex("figure.tex.j2", name=name, caption=text, star=star)
-    return {f"{name}.txt": text + "\n", f"{name}.tex": float_text}
+    return " ".join(f"{sentence}." for sentence in sentences if sentence) + "\n"

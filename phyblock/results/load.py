@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -216,9 +216,15 @@ class Run:
 
         Shares are in [0, 1]. The frame is a copy.
         """
-        from phyblock.results.estimates import all_estimates
+        import pandas as pd
 
-        return all_estimates(self)
+        from phyblock.results.estimates import ESTIMATE_COLUMNS, track_estimates
+
+        tracks = self.design.suite.tracks
+        parts = [track_estimates(self, track).assign(track=track) for track in tracks]
+        columns = ["track", *ESTIMATE_COLUMNS]
+        known = [part for part in parts if len(part)] or [pd.DataFrame(columns=columns)]
+        return pd.concat(known, ignore_index=True)[columns]
 
     def summary(self) -> pd.DataFrame:
         """Return one row per model: the headline of each track with the ends of its interval.
@@ -294,20 +300,6 @@ def load_run(path: str | Path) -> Run:
     lines = run_records(folder, manifest)
     frames = frames_of(((record, lines.start_bytes) for _, record in lines), design)
     return Run(folder, manifest, design, *frames, lines.is_cut)
-
-
-def of_models(run: Run, models: Sequence[str]) -> Run:
-    """Return the run with only these models, in its own order; all if none are named.
-
-    Values and intervals of a model do not change. Raises SpecError for a model that the run does
-    not have, or that is named twice.
-    """
-    if not models:
-        return run
-    chosen = checked_models(run, models)
-    kept = tuple(model for model in run.design.models if model.name in chosen)
-    records = run.records[run.records["model"].isin(chosen)]
-    return replace(run, design=replace(run.design, models=kept), records=records)
 
 
 def checked_models(run: Run, models: Sequence[str]) -> Sequence[str]:

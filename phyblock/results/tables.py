@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Hashable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,6 @@ from phyblock.results.compare import Side, rank_ranges_of, rank_text, sensitivit
 from phyblock.results.estimates import (
     Headline,
     Value,
-    all_estimates,
     headline_rows,
     track_estimates,
     track_notes,
@@ -296,7 +295,7 @@ def write_tables(path: str | Path) -> TablesWritten:
     """
     run = load_run(path)
     made = make_tables(run)
-    texts: dict[str, str | bytes] = {f"{TABLES}/estimates.csv": to_csv(all_estimates(run), "%.6f")}
+    texts: dict[str, str | bytes] = {f"{TABLES}/estimates.csv": to_csv(run.estimates, "%.6f")}
     for name, table in made.items():
         texts |= table.files(f"{TABLES}/{name}", name)
     folder = OutFolder(run.path)
@@ -311,7 +310,7 @@ def table_files() -> tuple[str, ...]:
     """Return the names of all files of tables that a run folder may hold."""
     names = [name for track, kind in kinds().items() for name in kind.report().tables or (track,)]
     names += [*(f"{track}_measures" for track in kinds()), *_FURTHER]
-    made = (f"{TABLES}/{name}.{form}" for form in ("csv", "md", "tex") for name in names)
+    made = (f"{TABLES}/{name}.{form}" for form in ("csv", "tex") for name in names)
     return (f"{TABLES}/estimates.csv", *made)
 
 
@@ -333,7 +332,7 @@ def make_tables(run: Run, names: Sequence[str] | None = None) -> dict[str, TextT
             if name in wanted:
                 made[name] = filled(run, track, layout)
     if "published" in wanted and (names is not None or is_as_published(run)):
-        made["published"] = beside_paper(run, 1)
+        made["published"] = beside_paper(run)
     if "sensitivity" in wanted:
         made["sensitivity"] = sensitivity_table(run)
     coverage = coverage_frame(run)
@@ -349,13 +348,8 @@ def summary_of(run: Run) -> Summary:
     """Return the summary of a run for the terminal."""
     coverage, tracks = coverage_frame(run), run.design.suite.tracks
     tables = [headline_table(run, track, coverage) for track in tracks]
-    lacking = (coverage["ok"] < coverage["recorded"]).to_numpy()
-    if lacking.any():
-        view = coverage_table(run)
-        rows = tuple(row for row, is_short in zip(view.rows, lacking, strict=True) if is_short)
-        cells = [{row[n] for row in rows} for n in range(len(view.columns))]
-        none = [c.name for c, of in zip(view.columns, cells, strict=True) if of == {"0"}]
-        tables.append(replace(view, rows=rows).without(none))
+    if (coverage["ok"] < coverage["recorded"]).any():
+        tables.append(coverage_table(run))
     blind = [sentence for track in tracks if (sentence := blind_sentence(run, track))]
     failed = run.records.dropna(subset=["error_message"])
     messages = Counter(zip(failed["model"], failed["error_message"], strict=True))

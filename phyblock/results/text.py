@@ -1,4 +1,4 @@
-"""Tables as text, CSV, Markdown and LaTeX; the summary of a run for the terminal."""
+"""Tables as text, CSV and LaTeX; the summary of a run for the terminal."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import functools
 import itertools
 import math
 import re
-from collections.abc import Callable, Collection, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -76,10 +76,9 @@ class TextTable:
         return cls(caption, tuple(columns), tuple(rows), tuple(notes), frame)
 
     def files(self, name: str, label: str, float_format: str = "%.6f") -> dict[str, str | bytes]:
-        """Return the table as CSV, Markdown and LaTeX, by file name."""
+        """Return the table as CSV and LaTeX, by file name."""
         return {
             f"{name}.csv": to_csv(self.frame, float_format),
-            f"{name}.md": to_markdown(self),
             f"{name}.tex": to_latex(self, f"phyblock-{label}"),
         }
 
@@ -92,15 +91,6 @@ class TextTable:
             "rows": self.rows,
             "notes": self.notes,
         }
-
-    def without(self, names: Collection[str]) -> TextTable:
-        """Return the table without the columns of these names."""
-        kept = [place for place, column in enumerate(self.columns) if column.name not in names]
-        return replace(
-            self,
-            columns=tuple(self.columns[place] for place in kept),
-            rows=tuple(tuple(row[place] for place in kept) for row in self.rows),
-        )
 
 
 def texts(key: str, heading: str, *, once: bool = False) -> Column:
@@ -170,31 +160,6 @@ def to_csv(frame: pd.DataFrame, float_format: str | None = None) -> str:
     return text
 
 
-_ESCAPES = str.maketrans({c: f"\\{c}" for c in "\\`*_[]<>|#~$"} | {"&": "&amp;", "\n": " "})
-
-
-def to_markdown(table: TextTable) -> str:
-    """Return the caption in bold, the table with its columns padded to align, the notes as a list.
-
-    Group headings join the column names, because Markdown has one heading row.
-    """
-    head = tuple(f"{column.group} {column.name}".strip() for column in table.columns)
-    grid = [[text.translate(_ESCAPES) for text in row] for row in (head, *table.rows)]
-    widths = [max(3, *(len(row[place]) for row in grid)) for place in range(len(head))]
-    is_text = [column.is_text for column in table.columns]
-    rule = [
-        "-" * w if text else "-" * (w - 1) + ":" for w, text in zip(widths, is_text, strict=True)
-    ]
-    lines = []
-    for row in (grid[0], rule, *grid[1:]):
-        shapes = zip(row, widths, is_text, strict=True)
-        cells = (cell.ljust(w) if text else cell.rjust(w) for cell, w, text in shapes)
-        lines.append(f"| {' | '.join(cells)} |")
-    notes = [f"- {note.translate(_ESCAPES)}" for note in table.notes]
-    parts = [f"**{table.caption.translate(_ESCAPES)}**", "\n".join(lines), "\n".join(notes)]
-    return "\n\n".join(part for part in parts if part) + "\n"
-
-
 _ESCAPES_LATEX = str.maketrans(
     {c: f"\\{c}" for c in "&%$#_{}"}
     | {c: f"{{{c}}}" for c in "[]*"}
@@ -223,19 +188,14 @@ def escape(text: str) -> str:
     return _LIGATURE.sub("-{}", text.translate(_ESCAPES_LATEX))
 
 
-def latex(template: str, **facts: Any) -> str:
-    """Return a float from a template of this package, for `\\input`; its filter `tex` escapes."""
-    return latex_template(template).render(facts)
-
-
 @functools.cache
-def latex_template(name: str) -> jinja2.Template:
-    """Return a template of this package for LaTeX."""
+def latex_template() -> jinja2.Template:
+    """Return the template of tables, whose marks and filter are for LaTeX."""
     marks = {"block_start_string": "<%", "block_end_string": "%>"}
     marks |= {"variable_start_string": "<<", "variable_end_string": ">>"}
     environment = jinja2.Environment(**marks, trim_blocks=True, keep_trailing_newline=True)  # type: ignore[arg-type]
     environment.filters["tex"] = escape
-    text = Path(__file__).with_name(name).read_text(encoding="utf-8")
+    text = Path(__file__).with_name("table.tex.j2").read_text(encoding="utf-8")
     return environment.from_string(text)
 
 
@@ -246,7 +206,7 @@ def to_latex(table: TextTable, label: str) -> str:
         size = len(list(members))
         groups.append({"name": name, "size": size, "first": first})
         first += size
-    return latex("table.tex.j2", table=table, label=label, groups=groups)
+    return latex_template().render(table=table, label=label, groups=groups)
 
 
 TABLES = "tables"

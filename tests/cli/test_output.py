@@ -166,7 +166,7 @@ def finished(tmp_path):
 
 @pytest.mark.parametrize("options", [(), ("--dry-run",)])
 @pytest.mark.parametrize(
-    "name", ["report/ch1/thesis.tex", "report.html", "tables/table1.md", "notes.txt"]
+    "name", ["report/ch1/thesis.tex", "report.html", "tables/table1.tex", "notes.txt"]
 )
 def test_a_run_begins_in_no_folder_of_another(suite, name, options):
     put(suite.out / name)
@@ -209,7 +209,7 @@ IN_THE_WAY = {
     "linked-report": (lambda run: link(run / "report"), "report: .*it is a link"),
     "linked-tables": (lambda run: link(run / "tables"), "tables: .*it is a link"),
     "page": (lambda run: put(run / "report.html"), r"report\.html: .*phyblock did not make"),
-    "table": (lambda run: put(run / "tables" / "table1.md"), "table1.md: .*did not make"),
+    "table": (lambda run: put(run / "tables" / "table1.tex"), "table1.tex: .*did not make"),
 }
 
 

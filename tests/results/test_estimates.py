@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from phyblock.data.official import match_published
 from phyblock.domain.question import CATEGORIES, LETTERS, SUBTASKS
-from phyblock.results.estimates import Headline, all_estimates
+from phyblock.results.estimates import Headline
 from phyblock.results.load import load_run
 from phyblock.results.paper import beside_paper, published_frame
 from phyblock.scoring.plan import Counts
@@ -52,7 +52,7 @@ def test_a_cut_last_line_is_passed_over_and_counted(tmp_path_factory, data):
 
 def of(run, measure, cell="overall", model="alpha", **way):
     """Return the one estimate of a measure; in setting A by the optimal matcher."""
-    frame = all_estimates(run)
+    frame = run.estimates
     wanted = {"measure": measure, "cell": cell, "model": model, **way}
     headline = {"setting": ["", "A"], "matcher": ["", "optimal"]}
     for name, value in wanted.items():
@@ -72,7 +72,7 @@ def value(run, *about, **way):
 @given(record_lists(), st.sampled_from(["skip", "count"]))
 def test_each_value_of_plans_is_the_micro_average_of_its_records(records, missing):
     left_out = {"missing", "api_error"} if missing == "skip" else set()
-    frame = all_estimates(run_of(records, manifest(missing=missing)))
+    frame = run_of(records, manifest(missing=missing)).estimates
     frame = frame[frame["measure"].isin(["precision", "recall", "f1"])]
     for row in frame.to_dict("records"):
         mine = [
@@ -101,11 +101,11 @@ def test_each_value_of_plans_is_the_micro_average_of_its_records(records, missin
 @given(record_lists())
 def test_seeds_alone_give_mean_and_deviation(records):
     keys = ["measure", "model", "setting", "matcher", "criterion", "cell"]
-    pooled = all_estimates(run_of(records, manifest())).set_index(keys)
+    pooled = run_of(records, manifest()).estimates.set_index(keys)
     alone = []
     for seed in (0, 1):
         mine = [one for one in records if one["seed"] == seed]
-        frame = all_estimates(run_of(mine, manifest(seeds=[seed])))
+        frame = run_of(mine, manifest(seeds=[seed])).estimates
         alone.append(frame.set_index(keys)["value"].reindex(pooled.index).astype("float64"))
     values = pd.concat(alone, axis=1)
     assert (pooled["seeds"] == values.count(axis=1)).all()
@@ -117,7 +117,7 @@ def test_seeds_alone_give_mean_and_deviation(records):
 @laws
 @given(record_lists())
 def test_shares_of_wrong_steps_and_of_blocks_add_up_to_one(records):
-    frame = all_estimates(run_of(records, manifest()))
+    frame = run_of(records, manifest()).estimates
     ways = ["model", "setting", "matcher", "criterion", "cell"]
     for prefix, left_out in (("wrong_", ""), ("blocks_", "blocks_support")):
         shares = frame[frame["measure"].str.startswith(prefix) & (frame["measure"] != left_out)]
@@ -271,31 +271,9 @@ def test_overall_is_compared_where_the_paper_s_levels_were_run(levels, has_overa
         record("mine", scene, scores=[score(1, 1, 3, matcher="paper")])
         for scene in ("001", "002", "003")
     ]
-    table = published_frame(run_of(records, facts), 1)
+    table = published_frame(run_of(records, facts))
     overall = table[table["cell"] == "overall"]
     assert overall["ours"].notna().all() == has_overall
-
-
-def test_ours_stands_beside_the_published_number_of_the_same_cell():
-    facts = manifest(models=[("mine", "GPT-4o"), ("seeded", "GPT-4.1")], seeds=[0, 1])
-    plans = [record("seeded", scene, seed, [score(2 + seed, 1, 1)])
-             for scene in ("000", "001") for seed in (0, 1)]  # fmt: skip
-    five = published_frame(run_of(plans, facts), 5).set_index(["model", "cell", "metric"])
-    f1 = [100 * 2 * tp / (2 * tp + 2) for tp in (2, 3)]
-    assert five.loc[("seeded", "2", "f1_mean"), "ours"] == pytest.approx(sum(f1) / 2)
-    assert five.loc[("seeded", "2", "f1_mean"), "published"] == 46.26
-    assert five.loc[("seeded", "2", "f1_sd"), "ours"] == pytest.approx((f1[1] - f1[0]) / 2**0.5)
-    facts = manifest(models=[("alpha", "GPT-4o")], seeds=[0])
-    facts["suite"]["tracks"] = ["step_planning"]
-    played = run_of([episode("alpha", "001", "pod", "done")], facts)
-    three = published_frame(played, 3).set_index("model").loc["alpha"]
-    assert (three["published"], three["ours"], three["difference"]) == (13.0, 25.0, 12.0)
-    facts["suite"]["tracks"] = ["vqa"]
-    asked = run_of([answered("SH", 0, "A"), answered("SH", 1, "B")], facts)
-    two = published_frame(asked, 2).set_index("cell")
-    assert (two.loc["SH", "published"], two.loc["SH", "ours"]) == (82.0, 50)
-    # A mean over a part of what the paper averages is not the same number.
-    assert two.loc[["object_property", "overall"], "ours"].isna().all()
 
 
 def test_the_published_numbers_come_out_of_the_official_counts(official_dir):
@@ -318,7 +296,7 @@ def test_the_published_numbers_come_out_of_the_official_counts(official_dir):
         matchers=["paper"],
         level1="membership",
     )
-    table = published_frame(run_of(records, facts), 1)
+    table = published_frame(run_of(records, facts))
     with_row = [model for model in models if match_published(model)]
     assert len(table) == 15 * len(with_row) >= 15 * 7
     assert table["difference"].abs().max() <= 0.065
@@ -329,7 +307,7 @@ def test_each_published_model_has_15_cells():
     facts = manifest(models=[("mine", "GPT-4o"), "other"], seeds=[0])
     scores = [score(1, 1, 3), score(1, 3, 1, matcher="paper")]
     run = run_of([record("mine", "001", scores=scores)], facts)
-    table = published_frame(run, 1)
+    table = published_frame(run)
     assert table[["model", "published_name"]].drop_duplicates().values.tolist() == [
         ["mine", "GPT-4o"]
     ]
@@ -342,8 +320,8 @@ def test_each_published_model_has_15_cells():
     assert cell["difference"] == pytest.approx(-25.2)
     assert by_cell.loc["3", "ours"].isna().all()
     assert by_cell.loc["3", "n"].tolist() == [0, 0, 0]
-    assert beside_paper(run, 1) is None  # of other scenes than the paper's
+    assert beside_paper(run) is None  # of other scenes than the paper's
     facts["suite"]["dataset"] = {"format": "official", "path": "checkout"}
-    beside = beside_paper(run_of([record("mine", "001", scores=scores)], facts), 1)
+    beside = beside_paper(run_of([record("mine", "001", scores=scores)], facts))
     assert len(beside.rows) == 3
     assert beside.notes[0] == "Largest absolute difference of 6 cells: 25.200."

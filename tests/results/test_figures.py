@@ -1,11 +1,10 @@
-"""Figures: drawn from estimates, the same bytes each time, with captions that LaTeX reads."""
+"""Figures: drawn from estimates, the same bytes each time, with captions."""
 
 import pytest
 
 from phyblock.results.estimates import Headline
 from phyblock.results.figures import (
     COLUMN_IN,
-    Look,
     cost,
     figures_of,
     forest,
@@ -13,16 +12,16 @@ from phyblock.results.figures import (
     shares,
     write_paper_figures,
 )
-from phyblock.results.load import load_run, of_models
+from phyblock.results.load import load_run
 from tests.web.factory import LEVELS, manifest, record, run_of, score, write_run
 
 TRACK = "full_planning"
 MODELS = ("alpha", "beta", "gamma")
 
 
-def records():
+def records(n_models=3):
     made = []
-    for n, model in enumerate(MODELS):
+    for n, model in enumerate(MODELS[:n_models]):
         for place, scene in enumerate(LEVELS):
             right = (place + n) % 4
             scores = [score(1 + right, n, 3 - right), score(2, n, 1, criterion="selection")]
@@ -54,10 +53,10 @@ def test_lines_show_the_headline_shares_fill_a_bar_and_a_forest_has_a_row_a_pair
             widths[place] = widths.get(place, 0) + bar.get_width()
         assert all(width == pytest.approx(100) for width in widths.values())
     # Of two models a row a part.
-    for chosen, rows in ((run, 3), (of_models(run, MODELS[:2]), 5)):
-        drawn = forest(chosen, track=TRACK)
+    for n, rows in ((3, 3), (2, 5)):
+        drawn = forest(run_of(records(n), manifest(models=MODELS[:n], seeds=[0])), track=TRACK)
         assert len(drawn.axes[0].get_yticks()) == rows
-    assert forest(of_models(run, MODELS[:1]), track=TRACK) is None
+    assert forest(run_of(records(1), manifest(models=MODELS[:1])), track=TRACK) is None
 
 
 def test_a_run_without_an_answer_draws_nothing_and_does_not_fail(tmp_path):
@@ -65,30 +64,25 @@ def test_a_run_without_an_answer_draws_nothing_and_does_not_fail(tmp_path):
         record(model, scene, 0, [], outcome="api_error") for model in MODELS for scene in LEVELS
     ]
     write_run(tmp_path, failed, manifest(models=MODELS, seeds=[0]))
-    assert write_paper_figures(load_run(tmp_path), (), Look()) == ()
+    assert write_paper_figures(load_run(tmp_path)) == ()
 
 
 def test_files_are_the_same_each_time_in_three_formats_with_captions(tmp_path):
     folder = write_run(tmp_path / "run", records(), manifest(models=MODELS, seeds=[0]))
     run = load_run(folder)
-    first = {file: file.read_bytes() for file in write_paper_figures(run, (), Look())}
+    first = {file: file.read_bytes() for file in write_paper_figures(run)}
     assert {file.stem for file in first} == {
         *("levels-full-planning", "errors", "losses", "cost-full-planning", "forest-full-planning")
     }
-    again = write_paper_figures(run, ["levels-full-planning", "errors"], Look())
-    assert len(again) == 10
+    again = write_paper_figures(run, ["levels-full-planning", "errors"])
+    assert len(again) == 8
     assert all(file.read_bytes() == first[file] for file in again)
     assert {file.stem for file in first} <= set(figures_of(run))
     assert not any(b"mathdefault" in data for file, data in first.items() if file.suffix == ".svg")
-    files = write_paper_figures(run, ["errors"], Look(COLUMN_IN, "serif", titled=False))
+    files = write_paper_figures(run, ["errors"], width_in=COLUMN_IN, titled=False)
     assert {file.name for file in files} == {
-        f"errors.{ending}" for ending in ("pdf", "svg", "png", "txt", "tex")
+        f"errors.{ending}" for ending in ("pdf", "svg", "png", "txt")
     }
     caption = (folder / "paper" / "errors.txt").read_text("utf-8")
     assert caption.startswith("Wrong steps by type.")
-    float_text = (folder / "paper" / "errors.tex").read_text("utf-8")
-    assert r"\begin{figure}[t]" in float_text
-    assert r"\includegraphics{errors.pdf}" in float_text
     assert "Wrong steps" not in (folder / "paper" / "errors.svg").read_text("utf-8")
-    wide = write_paper_figures(run, ["losses"], Look(), tmp_path / "out")
-    assert r"\begin{figure*}[t]" in wide[-1].read_text("utf-8")

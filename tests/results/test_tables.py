@@ -10,11 +10,9 @@ from hypothesis import strategies as st
 
 from phyblock.files import LIST
 from phyblock.results.compare import compare_models, write_comparison
-from phyblock.results.estimates import all_estimates
-from phyblock.results.figures import Look, write_paper_figures
 from phyblock.results.load import load_run, track_measures
 from phyblock.results.tables import coverage_frame, make_tables, summary_of, write_tables
-from phyblock.results.text import NO_VALUE, Column, TextTable, number, to_latex, to_markdown
+from phyblock.results.text import NO_VALUE, Column, TextTable, number, to_latex
 from phyblock.tracks.base import kind_of
 from phyblock.types import OUTCOMES
 from tests.results.test_estimates import EPISODES, complete, episodes, questions
@@ -23,7 +21,7 @@ from tests.web.factory import laws, manifest, record, record_lists, run_of, scor
 
 def shown_numbers(run, track):
     """Hold every number of a track's tables against the estimates of its model; return how many."""
-    frame = all_estimates(run)
+    frame = run.estimates
     scales = {measure.name: measure.scale for measure in track_measures(track)}
     known = {}
     for one in frame.to_dict("records"):
@@ -174,16 +172,13 @@ def test_latex_compiles_inside_any_document(tmp_path):
     )
     write_tables(folder)
     write_comparison(compare_models(load_run(folder)), folder / "tables")
-    write_paper_figures(load_run(folder), ["errors", "forest-full-planning"], Look())
     files = sorted(file.relative_to(folder) for file in folder.glob("*/*.tex"))
-    assert {"tables/comparison.tex", "tables/table1.tex", "paper/errors.tex"} <= {
-        file.as_posix() for file in files
-    }
+    assert {"tables/comparison.tex", "tables/table1.tex"} <= {file.as_posix() for file in files}
     inputs = "".join(rf"\input{{{file.with_suffix('')}}}" for file in files)
     for number_of_columns in ("onecolumn", "twocolumn"):
         document = (
             rf"\documentclass[{number_of_columns}]{{article}}"
-            rf"\usepackage{{booktabs}}\usepackage{{graphicx}}\graphicspath{{{{paper/}}}}"
+            rf"\usepackage{{booktabs}}\usepackage{{graphicx}}"
             rf"\begin{{document}}"
             rf"{inputs}\end{{document}}"
         )
@@ -201,19 +196,6 @@ TABLE = TextTable(
     (("gpt_4o|x", "9.5", "100.0 ± 12.5"), ("[b]*", NO_VALUE, "7.0 ± 0.5")),
     ("100 % of <all>.",),
 )
-
-
-def test_markdown_by_hand():
-    assert to_markdown(TABLE) == (
-        "**Precision &amp; recall (%)**\n"
-        "\n"
-        "| Model      | Level-1 Prec |   Level-1 F1 |\n"
-        "| ---------- | -----------: | -----------: |\n"
-        "| gpt\\_4o\\|x |          9.5 | 100.0 ± 12.5 |\n"
-        "| \\[b\\]\\*    |            \N{EN DASH} |    7.0 ± 0.5 |\n"
-        "\n"
-        "- 100 % of \\<all\\>.\n"
-    )
 
 
 def test_latex_by_hand():

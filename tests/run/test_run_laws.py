@@ -24,7 +24,7 @@ from tests.servers.openai_chat import OpenAIChat
 from tests.web.factory import manifest, run_of
 from tests.workspace import call
 
-SCORED = ("estimates.csv", "errors.csv", "errors.md", "table1.csv", "table1.md", "table1.tex")
+SCORED = ("estimates.csv", "errors.csv", "errors.tex", "table1.csv", "table1.tex")
 
 
 @pytest.fixture(scope="module")

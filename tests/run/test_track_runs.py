@@ -84,7 +84,7 @@ def test_all_tracks_ask_and_read_by_the_schema(inside, capsys):
         assert (rules(record) == {RULE}) == (how is not None)
     plans = [r["parse"]["plan"] for r in records if r["track"] == "full_planning" and "asked" in r]
     assert plans == [[1, 2, 3, 4]] * 4
-    for name in ("table1.md", "table2.md", "table3.md"):
+    for name in ("table1.tex", "table2.tex", "table3.tex"):
         assert "answers asked for as JSON" in inside.tables()[name].decode()
 
     # Under the other format it is another run; judged again it is the same.
