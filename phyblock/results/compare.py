@@ -40,20 +40,15 @@ from phyblock.results.text import (
 from phyblock.scoring.plan import Floats
 from phyblock.scoring.statistics import (
     CONFIDENCE,
-    NO_COMPONENT,
     POWER,
     Clusters,
-    Component,
     bounded,
     detectable,
     holm,
-    interaction,
     jackknife,
     least_p,
     rank_ranges,
     shift,
-    spread_of_items,
-    within,
 )
 from phyblock.text import counted
 from phyblock.tracks.base import kind_of, kinds
@@ -535,11 +530,8 @@ def write_comparison(found: Comparison, folder: Path) -> tuple[Path, ...]:
     return OutFolder(folder).write(files)
 
 
-ITEMS = "items"
-"""The row of the spread between items, to compare factors with."""
 _COLUMNS = (
-    *("track", "model", "factor", "levels"),
-    *(f"{name}{end}" for name in ("shift", "single") for end in ("", "_lo", "_hi")),
+    *("track", "model", "factor", "levels", "shift", "shift_lo", "shift_hi"),
     *("n_items", "n_clusters"),
 )
 
@@ -547,25 +539,24 @@ _COLUMNS = (
 def sensitivity_frame(run: Run) -> pd.DataFrame:
     """Return one row per track, model and factor: how far it moves scores, in the measure's unit.
 
-    `shift` is the standard deviation of the means of the `levels` of a factor, `single` that of the
-    scores of single items over levels beyond the shift; for repeats, that of a repeated question;
-    in the row `items`, that between items. `*_lo` and `*_hi` bound 95 % intervals over the
-    `n_clusters` base scenes of the `n_items` items that the model answered under every condition.
-    See `phyblock.scoring.statistics`. Empty if the run varies nothing.
+    `shift` is the standard deviation of the means of the `levels` of a factor; `shift_lo` and
+    `shift_hi` bound its 95 % interval over the `n_clusters` base scenes of the `n_items` items that
+    the model answered under every condition. See `phyblock.scoring.statistics`. Repeats are no
+    factor. Empty if the run varies nothing.
     """
     rows: list[dict[str, Any]] = []
     vary = run.design.suite.vary
     for track in run.design.suite.tracks if vary.factors else ():
         what = comparable(run, track)
         for model, scores, clusters in _scores(run, what):
-            for factor in (*vary.factors, ITEMS):
-                levels = len(scores) if factor == ITEMS else len(vary.names(factor))
-                row = {"track": track, "model": model, "factor": factor, "levels": levels}
-                parts = _components(vary, factor, scores, clusters)
-                for name, part in zip(("shift", "single"), parts, strict=True):
-                    scale = what.measure.scale
-                    row |= {name: scale * part.sd, f"{name}_lo": scale * part.lo}
-                    row[f"{name}_hi"] = np.minimum(scale * part.hi, what.measure.most_apart)
+            for factor in (one for one in vary.factors if one != REPEAT):
+                # (items, levels, blocks with each seed)
+                of_levels = np.moveaxis(scores[:, :, _places(vary, factor)], 1, 3)
+                part = shift(of_levels.reshape(*of_levels.shape[:2], -1), clusters)
+                sd, lo, hi = (what.measure.scale * end for end in (part.sd, part.lo, part.hi))
+                row = {"track": track, "model": model, "factor": factor, "shift": sd}
+                row |= {"levels": of_levels.shape[1], "shift_lo": lo}
+                row["shift_hi"] = np.minimum(hi, what.measure.most_apart)
                 rows.append(row | {"n_items": len(scores), "n_clusters": clusters.size})
     return pd.DataFrame(rows, columns=list(_COLUMNS))
 
@@ -588,43 +579,16 @@ def _scores(run: Run, what: Comparable) -> Iterator[tuple[str, Floats, Clusters]
             yield side.model, scores, Clusters.of([parents[scene] for scene, _ in names])
 
 
-def _components(
-    vary: VarySpec, factor: str, scores: Floats, clusters: Clusters
-) -> tuple[Component, Component]:
-    """Return the shift of a factor, and its effect on single items."""
-    if factor == ITEMS:
-        return NO_COMPONENT, spread_of_items(scores, clusters)
-    # (items, levels, blocks with each seed, repeats)
-    of_levels = np.moveaxis(scores[:, :, _places(vary, factor)], 1, 3)
-    of_levels = of_levels.reshape(*of_levels.shape[:2], -1, of_levels.shape[-1])
-    if factor == REPEAT:
-        return NO_COMPONENT, within(np.moveaxis(of_levels[..., 0], 1, 2), clusters)
-    # Repeats separate noise if nothing else was varied.
-    cells = of_levels.mean(axis=3) if of_levels.shape[2] > 1 else of_levels[:, :, 0]
-    return shift(cells, clusters), interaction(cells, clusters)
-
-
 def _places(vary: VarySpec, factor: str) -> NDArray[np.intp]:
-    """Return numbers of the variants by factor level, (levels, blocks, repeats)."""
-    levels, repeats = vary.names(factor), vary.names(REPEAT) or ("1",)
-    places: dict[Variant, dict[tuple[str, str], int]] = {}
+    """Return numbers of the variants by factor level, (levels, blocks)."""
+    levels = vary.names(factor)
+    places: dict[Variant, dict[str, int]] = {}
     for place, variant in enumerate(vary.variants):
         here = dict(variant.levels)
         level = here.pop(factor, levels[0])
-        again = level if factor == REPEAT else here.pop(REPEAT, "1")
-        places.setdefault(Variant(tuple(here.items())), {})[level, again] = place
-    # Each repeat is a level of its own: all other factors are blocks.
-    pairs = [[(n, again) for again in ((n,) if factor == REPEAT else repeats)] for n in levels]
-    every = {pair for row in pairs for pair in row}
-    whole = [found for found in places.values() if every <= set(found)]
-    numbers = [[[found[pair] for pair in row] for found in whole] for row in pairs]
-    return np.array(numbers, dtype=np.intp)
-
-
-def factor_name(factor: str) -> str:
-    """Return the name of a factor for people."""
-    names = {REPEAT: "asked again", ITEMS: "between items"}
-    return names.get(factor, factor.replace("_", " "))
+        places.setdefault(Variant(tuple(here.items())), {})[level] = place
+    whole = [found for found in places.values() if len(found) == len(levels)]
+    return np.array([[found[level] for found in whole] for level in levels], dtype=np.intp)
 
 
 def sensitivity_table(run: Run) -> TextTable | None:
@@ -633,19 +597,14 @@ def sensitivity_table(run: Run) -> TextTable | None:
     if table.empty:
         return None
     columns = [texts("model", "Model"), *track_name(tracks)]
-    columns.append(Column("Factor", "", True, lambda row: factor_name(row["factor"])))
-    for name, group in (("shift", "Shift of all"), ("single", "Single items")):
-        columns += [values(name, "SD", group), intervals(group, f"{name}_lo", f"{name}_hi")]
+    columns.append(Column("Factor", "", True, lambda row: row["factor"].replace("_", " ")))
+    columns += [values("shift", "Shift"), intervals("", "shift_lo", "shift_hi")]
     notes = [
         f"{kind_of(str(track)).title}: {comparable(run, str(track)).measure.heading_in_unit}, "
         f"{sizes_text(group)}."
         for track, group in table.groupby("track", sort=False)
     ]
-    notes.append(
-        "Shift: standard deviation of the means of a factor's levels. Single items: of one item's "
-        "score over levels, beyond the shift and noise; asked again: of one question repeated. One "
-        "factor alone without repeats cannot be told from noise in single items."
-    )
+    notes.append("Shift: standard deviation of the means of a factor's levels.")
     return TextTable.of(table, f"Effect of the presentation{run.design.of_suite}", columns, notes)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -244,13 +245,11 @@ def _estimates(
 
 def _over_seeds(each: Floats) -> tuple[NDArray[np.intp], Floats, Floats, Floats, Floats]:
     """Return the number of seeds with a value, and their mean, sample sd, least and most."""
-    known = ~np.isnan(each)
-    count = known.sum(axis=0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        mean = np.where(known, each, 0).sum(axis=0) / np.where(count, count, np.nan)
-        square = np.where(known, (each - mean) ** 2, 0).sum(axis=0)
-        sd = np.sqrt(square / np.where(count > 1, count - 1, np.nan))
-    return count, mean, sd, np.fmin.reduce(each), np.fmax.reduce(each)
+    with warnings.catch_warnings():
+        # Where no seed has a value, there is none.
+        warnings.simplefilter("ignore", RuntimeWarning)
+        mean, sd = np.nanmean(each, axis=0), np.nanstd(each, axis=0, ddof=1)
+    return (~np.isnan(each)).sum(axis=0), mean, sd, np.fmin.reduce(each), np.fmax.reduce(each)
 
 
 def track_notes(run: Run, track: str) -> tuple[str, ...]:

@@ -47,9 +47,7 @@ def export_frame(run: Run) -> pd.DataFrame:
         frame.insert(5, "variant", run.records["variant"].astype("string"))
     prompts = read_prompts(run.path)
     rows = [_row(run, one, prompts) for one in RecordLines(run.path).at(run.records["start"])]
-    for name, kind in types.items():
-        frame[name] = pd.Series([row.get(name) for row in rows], frame.index, dtype=kind)
-    return frame
+    return frame.join(pd.DataFrame(rows, frame.index, list(types)).astype(types))
 
 
 def _row(

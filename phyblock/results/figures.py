@@ -17,9 +17,7 @@ import pandas as pd
 
 from phyblock.files import OutFolder, cache_dir
 from phyblock.results.compare import (
-    ITEMS,
     compare_models,
-    factor_name,
     sensitivity_frame,
     sizes_text,
 )
@@ -273,32 +271,25 @@ def cost(run: Run, *, track: str) -> Figure | None:
 
 
 def sensitivity(run: Run, *, track: str) -> Figure | None:
-    """Draw shift and single items as dots, a panel per factor and a row per model, or None.
-
-    The spread between items is not drawn: it is an order of magnitude larger, and not a factor.
-    """
+    """Draw the shift by each factor as dots, a panel per factor and a row per model, or None."""
     table = sensitivity_frame(run)
-    table = table[(table["track"] == track) & (table["factor"] != ITEMS)]
+    table = table[table["track"] == track]
     if not len(table):
         return None
     factors, models = list(table["factor"].unique()), list(table["model"].unique())
-    figure, axes = _axes(0.9 + 0.3 * len(models), len(factors))
-    parts = {"shift": ("shift of all items", _ACCENT), "single": ("single items", _COLORS[1])}
+    figure, axes = _axes(0.9 + _ROW_IN * len(models), len(factors))
     for ax, factor in zip(axes, factors, strict=True):
         rows = table[table["factor"] == factor].set_index("model").loc[models]
-        for n, (name, (label, color)) in enumerate(parts.items()):
-            places = np.arange(len(models)) + (n - 0.5) * 0.32
-            value, lo, hi = (
-                rows[f"{name}{end}"].to_numpy(np.float64) for end in ("", "_lo", "_hi")
-            )
-            ax.hlines(places, lo, hi, color=color, linewidth=1.3)
-            ax.plot(value, places, _MARKERS[n], color=color, label=label, clip_on=False)
-        ax.set_title(factor_name(factor).replace(" ", "\n"), fontsize=min(8.5, 40 / len(factors)))
+        places = range(len(models))
+        ax.hlines(places, rows["shift_lo"], rows["shift_hi"], color=_ACCENT, linewidth=1.3)
+        ax.plot(rows["shift"], places, "o", color=_ACCENT, clip_on=False)
+        name = str(factor).replace("_", "\n")
+        ax.set_title(name, fontsize=min(8.5, 40 / len(factors)))
         ax.set_xlabel("SD")
     _named_rows(axes[0], models)
     axes[0].set_xlim(left=0)
-    what = f"Standard deviation of {Headline(run, track).measure.heading_in_unit}"
-    how = f"{what}; lines: 95 % intervals, {sizes_text(table)}"
+    what = f"Standard deviation of the means of {Headline(run, track).measure.heading_in_unit}"
+    how = f"{what} by level; lines: 95 % intervals, {sizes_text(table)}"
     return _finished(figure, run, f"{kind_of(track).title}: effect of the presentation", how)
 
 

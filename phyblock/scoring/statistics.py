@@ -280,9 +280,6 @@ class Component:
     hi: float
 
 
-NO_COMPONENT = Component(np.nan, np.nan, np.nan)
-
-
 def shift(scores: Floats, clusters: Clusters) -> Component:
     """Standard deviation by which levels move the mean over items; (items, levels, blocks).
 
@@ -294,7 +291,7 @@ def shift(scores: Floats, clusters: Clusters) -> Component:
 
     items, levels, _ = scores.shape
     if items < 2 or levels < 2 or clusters.size < 2:
-        return NO_COMPONENT
+        return Component(np.nan, np.nan, np.nan)
     moved = (scores - scores.mean(axis=1, keepdims=True)).mean(axis=2)
     estimate = jackknife(
         np.concatenate([moved, np.ones((items, 1))], axis=1),
@@ -315,92 +312,3 @@ def shift(scores: Floats, clusters: Clusters) -> Component:
         return float(np.sqrt(noncentrality * error) / df)
 
     return Component(float(np.sqrt(max(total - error, 0.0) / df)), end(1 - _TAIL), end(_TAIL))
-
-
-def interaction(scores: Floats, clusters: Clusters) -> Component:
-    """Standard deviation by which levels move items beyond the shift; (items, levels, blocks).
-
-    With one block it cannot be separated from noise.
-    """
-    items, levels, blocks = scores.shape
-    if items < 2 or levels < 2 or blocks < 2 or clusters.size < 2:
-        return NO_COMPONENT
-    moved = scores - scores.mean(axis=1, keepdims=True)
-    mean = moved.mean(axis=2, keepdims=True)
-    counts = np.concatenate(
-        [
-            np.ones((items, 1)),
-            (mean**2).sum(axis=(1, 2))[:, None],
-            ((moved - mean) ** 2).sum(axis=(1, 2))[:, None],
-            moved.reshape(items, -1),
-        ],
-        axis=1,
-    )
-
-    def variance(sums: Floats) -> Floats:
-        n = sums[..., 0]
-        cells = (sums[..., 3:] / n[..., None]).reshape(*n.shape, levels, blocks)
-        level = cells.mean(axis=-1)
-        df = (n - 1) * (levels - 1)
-        of_levels = (sums[..., 1] - n * (level**2).sum(axis=-1)) / df
-        apart = ((cells - level[..., None]) ** 2).sum(axis=(-2, -1))
-        of_blocks = (sums[..., 2] - n * apart) / (df * (blocks - 1))
-        return np.stack([of_levels - of_blocks / blocks, of_blocks / blocks], axis=-1)
-
-    estimate = jackknife(counts, clusters, variance)
-    most = (clusters.size - 1) * (levels - 1)
-    above, noise = (float(value) for value in estimate.value)
-    return _of_variance(above, float(estimate.se[0]), noise, most=most)
-
-
-def within(scores: Floats, clusters: Clusters) -> Component:
-    """Standard deviation of an item's score over repeats of one condition.
-
-    `scores` has shape (items, conditions, repeats).
-    """
-    items, ways, repeats = scores.shape
-    if items < 2 or repeats < 2 or clusters.size < 2:
-        return NO_COMPONENT
-    variances = scores.var(axis=2, ddof=1).mean(axis=1)
-    counts = np.stack([np.ones(items), variances], axis=1)
-    estimate = jackknife(counts, clusters, lambda sums: sums[..., 1] / sums[..., 0])
-    most = clusters.size * ways * (repeats - 1)
-    return _of_variance(float(estimate.value), float(estimate.se), most=most)
-
-
-def spread_of_items(scores: Floats, clusters: Clusters) -> Component:
-    """Standard deviation of items, each by its mean over all conditions; `scores` (items, ...)."""
-    items = len(scores)
-    if items < 3 or clusters.size < 3:
-        return NO_COMPONENT
-    means = scores.reshape(items, -1).mean(axis=1)
-    # Centered first: the difference of large squares would be noise.
-    means = means - means.mean()
-    counts = np.stack([np.ones(items), means, means**2], axis=1)
-    estimate = jackknife(
-        counts,
-        clusters,
-        lambda sums: (sums[..., 2] - sums[..., 1] ** 2 / sums[..., 0]) / (sums[..., 0] - 1),
-    )
-    return _of_variance(float(estimate.value), float(estimate.se), most=clusters.size - 1)
-
-
-def _of_variance(variance: float, se: float, noise: float = 0.0, *, most: float) -> Component:
-    """The component of `variance`, which is a mean square minus `noise`.
-
-    The mean square has the interval of chi-square with the degrees of freedom that its error
-    implies (Satterthwaite, *An approximate distribution of estimates of variance components*,
-    Biometrics Bulletin 2, 1946), also minus `noise`, and not below zero. An estimated error is
-    sometimes far too small, even 0, so the degrees of freedom are at `most` those of independent
-    base scenes.
-    """
-    from scipy.special import chdtri
-
-    square = variance + noise
-    ends = (square, square)
-    if square > 0:
-        ratio = square / se if se > 0 else math.inf
-        df = min(2 * ratio * ratio, most)
-        ends = (square * df / chdtri(df, _TAIL), square * df / chdtri(df, 1 - _TAIL))
-    parts = (variance, *(end - noise for end in ends))
-    return Component(*(float(np.sqrt(max(part, 0.0))) for part in parts))

@@ -100,17 +100,17 @@ SECTIONS = dict(
     )
 )
 SHOWN = {
-    "A block shape": ("towers", "f1", {"oracle": 1.0, "random": None}, "table1.md", "hexagon"),
-    "A background": ("grounds", "f1", {"random": None}, "sensitivity.md", "sand"),
-    "A question kind": ("ground", "accuracy", {"oracle": 1.0}, "table2.md", "GR"),
+    "A block shape": ("towers", "f1", {"oracle": 1.0, "random": None}, "table1.tex", "hexagon"),
+    "A background": ("grounds", "f1", {"random": None}, "sensitivity.tex", "sand"),
+    "A question kind": ("ground", "accuracy", {"oracle": 1.0}, "table2.tex", "GR"),
     "A measure": (
         "needless",
         "needless",
         {"oracle": 0.0, "all-candidates": None},
-        "full_planning_measures.md",
+        "full_planning_measures.tex",
         "Needless steps",
     ),
-    "A track": ("counting", "exact", {"oracle": 1.0, "random": None}, "counting.md", "Counting"),
+    "A track": ("counting", "exact", {"oracle": 1.0, "random": None}, "counting.tex", "Counting"),
 }
 """By section: the folder of its run, a measure with values, a table, and a text of the page."""
 

@@ -91,7 +91,7 @@ def test_cached_replies_are_worth_the_same_and_other_rules_score_them_without_a_
     assert {record["parse"]["parser"] for record in records} == {"official"}
     assert sorted(map(str, texts)) == sorted(str(r.get("reply", {}).get("text")) for r in records)
     assert all(r["reply"]["cached"] for r in records if r["model"] == "alpha")
-    assert "matcher paper" in copy.tables()["table1.md"].decode()
+    assert "matcher paper" in copy.tables()["table1.tex"].decode()
 
 
 def test_without_the_cache_it_is_neither_read_nor_written(copy):

@@ -8,7 +8,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from scipy import stats
-from scipy.special import gammaincinv
 
 from phyblock.scoring.plan import f1_of, ratio_of
 from phyblock.scoring.statistics import (
@@ -17,12 +16,9 @@ from phyblock.scoring.statistics import (
     detectable,
     holm,
     in_range,
-    interaction,
     jackknife,
     rank_ranges,
     shift,
-    spread_of_items,
-    within,
 )
 from tests.scoring.cases import World, precision_of, recall_of
 from tests.shipped import official_tasks
@@ -297,7 +293,7 @@ def test_intervals_hold_the_truth_and_tests_err_as_often_as_they_say(world):
     assert 0.03 <= erred / n <= 0.07
 
 
-ITEMS, LEVELS, BLOCKS, REPEATS = 40, 2, 8, 2
+ITEMS, LEVELS, BLOCKS = 40, 2, 16
 TRUTH = {"shift": 0.04, "interaction": 0.08, "within": 0.1, "spread": 0.3}
 RUNS = 150
 
@@ -311,20 +307,18 @@ def close(one, other, scale=1.0):
     return np.allclose(np.array(a) * scale, b, rtol=1e-6, atol=1e-7)
 
 
-@pytest.mark.parametrize("component", [shift, interaction])
 @given(seed=st.integers(0, 10**6))
-def test_what_belongs_to_items_and_blocks_is_no_work_of_levels(component, seed):
+def test_what_belongs_to_items_and_blocks_is_no_work_of_levels(seed):
     scores, rng = drawn(seed), np.random.default_rng(seed + 1)
     other = scores + rng.normal(size=(12, 1, 1)) + rng.normal(size=(1, 1, 4))
-    assert close(component(scores, alone(12)), component(other, alone(12)))
-    assert close(component(scores, alone(12)), component(100 * scores, alone(12)), 100)
+    assert close(shift(scores, alone(12)), shift(other, alone(12)))
+    assert close(shift(scores, alone(12)), shift(100 * scores, alone(12)), 100)
 
 
 @given(seed=st.integers(0, 10**6))
-def test_an_effect_alike_on_all_items_is_shift_alone(seed):
+def test_an_effect_alike_on_all_items_is_shift(seed):
     scores = drawn(seed)
     moved = scores + np.array([0.0, 5.0, -1.0])[None, :, None]
-    assert close(interaction(scores, alone(12)), interaction(moved, alone(12)))
     assert shift(moved, alone(12)).sd > shift(scores, alone(12)).sd
 
 
@@ -337,68 +331,22 @@ def test_two_levels_are_half_their_squared_difference_less_its_error():
     )
 
 
-def test_components_of_a_crossed_design_are_those_of_the_analysis_of_variance():
-    """By the sums of squares of a textbook: items x levels x blocks, one score a cell."""
-    y = drawn(5)
-    n, levels, blocks = y.shape
-    mean = {axes: y.mean(axis=axes, keepdims=True) for axes in [(2,), (1,), (0,), (1, 2), (0, 2)]}
-    mean |= {(0, 1): y.mean(axis=(0, 1), keepdims=True), (0, 1, 2): y.mean(keepdims=True)}
-    two = mean[2,] - mean[1, 2] - mean[0, 2] + mean[0, 1, 2]
-    three = y - mean[2,] - mean[1,] - mean[0,] + mean[1, 2] + mean[0, 2] + mean[0, 1]
-    three = three - mean[0, 1, 2]
-    df = (n - 1) * (levels - 1)
-    square = blocks * (two**2).sum() / df
-    rest = (three**2).sum() / (df * (blocks - 1))
-    expected = max(0.0, (square - rest) / blocks)
-    assert interaction(y, alone(n)).sd ** 2 == pytest.approx(expected)
-
-
-def test_known_components_lie_in_their_intervals():
+def test_a_known_shift_lies_in_its_interval():
     rng = np.random.default_rng(2)
-    hits = dict.fromkeys(TRUTH, 0)
-    squares = dict.fromkeys(TRUTH, 0.0)
+    hits, square = 0, 0.0
     for _ in range(RUNS):
-        y = rng.normal(0, TRUTH["spread"], (ITEMS, 1, 1, 1))
-        y = y + np.array([-1, 1])[None, :, None, None] * TRUTH["shift"] / np.sqrt(2)
-        y = y + rng.normal(0, TRUTH["interaction"], (ITEMS, LEVELS, 1, 1))
-        y = y + rng.normal(0, TRUTH["within"], (ITEMS, LEVELS, BLOCKS, REPEATS))
-        clusters = alone(ITEMS)
-        cells = y.mean(axis=3)
-        found = {
-            "shift": shift(cells, clusters),
-            "interaction": interaction(cells, clusters),
-            "within": within(y.reshape(ITEMS, -1, REPEATS), clusters),
-        }
-        for name, part in found.items():
-            hits[name] += part.lo <= TRUTH[name] <= part.hi
-            squares[name] += part.sd**2 / RUNS
-    for name in found:
-        # Three standard errors of a share of 0.95 in so many runs, and of their mean.
-        assert hits[name] / RUNS > 0.89, name
-        assert np.sqrt(squares[name]) == pytest.approx(TRUTH[name], rel=0.15), name
-
-
-def test_scenes_that_agree_by_chance_are_no_certainty():
-    """The error is 0 where every scene says the same, but there are four scenes of each alone."""
-    alike = np.tile(np.array([0.0, 1.0, 0.0, 1.0]), (4, 3, 1))
-    spread = np.array([0.0, 1.0, 0.0, 1.0])[:, None] * np.ones((4, 3))
-    across = np.array([[[0.0, 0.0], [1.0, 1.0]], [[1.0, 1.0], [0.0, 0.0]]] * 2)
-    parts = (
-        within(alike, alone(4)),
-        spread_of_items(spread, alone(4)),
-        interaction(across, alone(4)),
-    )
-    for part, df in zip(parts, (4 * 3 * 3, 3, 3), strict=True):
-        assert part.lo < part.sd < part.hi
-        ends = part.sd * np.sqrt(df / (2 * gammaincinv(df / 2, [0.975, 0.025])))
-        assert np.allclose([part.lo, part.hi], ends)
+        y = rng.normal(0, TRUTH["spread"], (ITEMS, 1, 1))
+        y = y + np.array([-1, 1])[None, :, None] * TRUTH["shift"] / np.sqrt(2)
+        y = y + rng.normal(0, TRUTH["interaction"], (ITEMS, LEVELS, 1))
+        y = y + rng.normal(0, TRUTH["within"], (ITEMS, LEVELS, BLOCKS))
+        part = shift(y, alone(ITEMS))
+        hits += part.lo <= TRUTH["shift"] <= part.hi
+        square += part.sd**2 / RUNS
+    # Three standard errors of a share of 0.95 in so many runs, and of its mean.
+    assert hits / RUNS > 0.89
+    assert np.sqrt(square) == pytest.approx(TRUTH["shift"], rel=0.15)
 
 
 def test_nothing_to_tell_has_no_value():
-    scores = drawn(1)
-    assert np.isnan(interaction(scores[:, :, :1], alone(12)).sd)
-    assert np.isnan(within(scores[:, :, :1], alone(12)).sd)
-    assert np.isnan(shift(scores, Clusters.of([("one",)] * 12)).sd)
-    assert np.isnan(spread_of_items(scores[:2], alone(2)).sd)
-    alike = np.ones((12, 3, 4))
-    assert [shift(alike, alone(12)).hi, interaction(alike, alone(12)).sd] == [0.0, 0.0]
+    assert np.isnan(shift(drawn(1), Clusters.of([("one",)] * 12)).sd)
+    assert shift(np.ones((12, 3, 4)), alone(12)).hi == 0.0
