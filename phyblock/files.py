@@ -27,7 +27,7 @@ import stat
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path, PurePosixPath
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
 from phyblock.errors import DataError, Problem, SpecError, StoreError, reason_of
@@ -58,7 +58,7 @@ class NotRegularError(ValueError):
     """The file is a pipe, a device or a socket, which could block or be read without end."""
 
 
-def open_regular(path: Path) -> BinaryIO:
+def open_regular(path: Path) -> io.BufferedReader:
     """Open a regular file for reading. Raises NotRegularError for any other, OSError as `open`."""
     # A pipe without a writer would block an ordinary open.
     number = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
@@ -100,14 +100,11 @@ def read_own_yaml(path: Path) -> Any:
 
 def digest_of_file(path: Path) -> str:
     """Return the SHA-256 of a file, "" if there is none. Raises OSError, NotRegularError."""
-    digest = hashlib.sha256()
     try:
         with open_regular(path) as file:
-            while chunk := file.read(2**20):
-                digest.update(chunk)
+            return hashlib.file_digest(file, "sha256").hexdigest()
     except FileNotFoundError:
         return ""
-    return digest.hexdigest()
 
 
 def load_json(data: bytes | str) -> Any:

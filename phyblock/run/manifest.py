@@ -16,6 +16,7 @@ from typing import Any
 from phyblock.config.models import HUMAN, ModelConfig
 from phyblock.config.suite import Suite, Variant
 from phyblock.data.base import UNNUMBERED, Dataset, read_version
+from phyblock.files import digest_of_file
 from phyblock.parsing.text import READER_VERSION
 from phyblock.records.files import FORMAT, Manifest
 from phyblock.sim.engine import ENGINES, described_engine
@@ -133,7 +134,7 @@ def _model(model: ModelConfig) -> dict[str, object]:
         return model.identity()
     digest = hashlib.sha256()
     for path in sorted((*folder.glob("*.json"), *folder.glob("records.jsonl"))):
-        digest.update(f"{path.name} {hashlib.sha256(path.read_bytes()).hexdigest()}\n".encode())
+        digest.update(f"{path.name} {digest_of_file(path)}\n".encode())
     return {**model.identity(), "recording": digest.hexdigest()}
 
 
