@@ -58,16 +58,6 @@ _SELF_HOSTED = (
 """Providers that need an address, from `api_base` or the variable PROVIDER_API_BASE: otherwise
 litellm sends their prompts to api.openai.com, except llamafile's."""
 _RENAMES_PARAMETERS = re.compile(r"o\d|gpt-5")
-_OWNERS = (("gpt", "openai"), ("o1", "openai"), ("o3", "openai"), ("claude", "anthropic"),
-           ("gemini", "gemini"), ("qwen-vl", "dashscope"))  # fmt: skip
-_OPENAI_DETAILS = ("auto", "low", "high", "original")
-_DETAILS: Mapping[str, tuple[str, ...]] = {
-    "openai": _OPENAI_DETAILS,
-    "azure": _OPENAI_DETAILS,
-    "gemini": ("low", "medium", "high", "ultra_high"),
-    "anthropic": (),
-}
-"""Values of `image_detail` by provider; those of all others are unknown."""
 _OWN_BODY = (
     "model", "messages", "n", "best_of", "stream", "max_tokens", "max_completion_tokens",
 )  # fmt: skip
@@ -144,9 +134,7 @@ class Tariff(Price):
 
 def _id_faults(model_id: str) -> Iterator[Fault]:
     if not re.fullmatch(r"[^/ ]+/[^ ]+", model_id):
-        owner = next((who for start, who in _OWNERS if model_id.lower().startswith(start)), None)
-        hint = f"did you mean {owner}/{model_id}?" if owner else ""
-        hint = hint or f"behind a server of your own it is hosted_vllm/{model_id}"
+        hint = f"such as openai/gpt-4o-2024-08-06; on a server of your own hosted_vllm/{model_id}"
         yield Fault("is not a litellm id", "provider/model", hint=hint)
 
 
@@ -237,7 +225,7 @@ class ModelConfig(Section):
     image_detail: ImageDetail | None = None
     """Detail of pictures: the `detail` of OpenAI and compatible servers (auto, low, high,
     original), the media resolution of Gemini (low, medium, high, ultra_high); null: the provider's
-    default."""
+    default. A provider refuses or ignores a value that it does not know."""
     extra_body: Annotated[dict[str, JsonValue], checked(_body_faults)] = Field(default_factory=dict)
     """Further fields of the request body, sent unchanged; not model, messages, n, best_of, stream,
     max_tokens, max_completion_tokens."""
@@ -265,7 +253,7 @@ class ModelConfig(Section):
 
     def faults(self) -> Iterator[Fault]:
         """Yield fields that conflict with others or with the provider."""
-        provider, known = self.provider, _DETAILS.get(self.provider)
+        provider = self.provider
         if self.replay is not None:
             with_replay = ("groups", "published", "replay", "size_b")
             for key in sorted(self.model_fields_set - {"name", *with_replay}):
@@ -276,15 +264,10 @@ class ModelConfig(Section):
             # A direct call would take the provider's key to OpenAI.
             message = f"needs api_base, the address of the server that speaks for {provider}"
             yield Fault(message, at=("transport",))
-        if self.image_detail is not None and known is not None and self.image_detail not in known:
-            # It would be ignored, or refused in every request.
-            allowed = ", ".join(known) or "none"
-            yield Fault(f"is not known to {provider}", allowed, at=("image_detail",))
         if self.batch and provider not in BATCH_PROVIDERS:
             message = f"is not possible: phyblock does not speak the batches of {provider}"
             allowed = ", ".join(f"{name}/..." for name in BATCH_PROVIDERS)
-            hint = "where the provider has the /files and /batches of OpenAI, use openai/... with "
-            yield Fault(message, allowed, at=("batch",), hint=f"{hint}its api_base")
+            yield Fault(message, allowed, at=("batch",))
         if self.batch and len(self.addresses) > 1:
             message = "is not possible with a list of servers: a batch is at one of them"
             yield Fault(message, at=("batch",))
