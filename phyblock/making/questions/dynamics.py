@@ -47,6 +47,7 @@ from phyblock.making.questions.structures import (
     free_tops,
     group_of,
     is_sure,
+    lots_of,
     lowered,
     lowered_round,
     stage,
@@ -146,7 +147,7 @@ def falling(blocks: Sequence[Block], order: int) -> Lot | None:
     }
     for lot in sorted(lots, key=sorted):
         still = [block for block in left if block.order not in lot]
-        loose = groups([block for block in left if block.order in lot])
+        loose = lots_of([block for block in left if block.order in lot])
         is_so = is_balanced(still) and not any(is_balanced([*still, *one]) for one in loose)
         if is_so and surely_stands(blocks) and is_sure(left, lot):
             return lot

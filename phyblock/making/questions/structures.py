@@ -19,7 +19,13 @@ from phyblock.domain.blocks import COLORS, SHAPES, BlockType, Euler
 from phyblock.domain.scene import Block, Scene
 from phyblock.making.questions.base import Floats, pick
 from phyblock.sim.balance import MARGIN_M, is_balanced, surely_falls, surely_stands
-from phyblock.sim.contact import bounds_m, drop_height_m, find_overlaps
+from phyblock.sim.contact import (
+    GROUND,
+    bounds_m,
+    drop_height_m,
+    find_overlaps,
+    support_graph,
+)
 from phyblock.sim.dynamics import groups
 from phyblock.sim.geometry import corners_m
 from phyblock.sim.outcomes import holds
@@ -214,6 +220,18 @@ def group_of(blocks: Sequence[Block], order: int) -> tuple[Block, ...]:
     return next(group for group in groups(blocks) if any(b.order == order for b in group))
 
 
+def lots_of(blocks: Sequence[Block]) -> list[list[Block]]:
+    """Return the blocks in lots; of every block of a lot of several, one rests on it or is below
+    it. Blocks that only touch side by side are of different lots: one may fall without the other.
+    """
+    lots: list[set[int]] = []
+    for order, below in support_graph(blocks).items():
+        lot = ({order} | below) - {GROUND}
+        lot = lot.union(*(other for other in lots if other & lot))
+        lots = [other for other in lots if not other & lot] + [lot]
+    return [[block for block in blocks if block.order in lot] for lot in lots]
+
+
 def is_sure(left: Sequence[Block], moved: Collection[int]) -> bool:
     """True if blocks just left to themselves surely do what a simulation says.
 
@@ -221,7 +239,7 @@ def is_sure(left: Sequence[Block], moved: Collection[int]) -> bool:
     by those that stay: with every weight 5 mm off to any side, other masses, and friction to spare.
     """
     still = [block for block in left if block.order not in moved]
-    falling = groups([block for block in left if block.order in moved])
+    falling = lots_of([block for block in left if block.order in moved])
     return all(surely_stands(group) for group in groups(still)) and all(
         surely_falls([*still, *lot]) for lot in falling
     )
