@@ -290,13 +290,6 @@ def seen_order(
     return recipe.blocks[vertex].order if vertex >= 0 else None
 
 
-def are_apart(recipe: QuestionPicture, marks: Sequence[Mark]) -> bool:
-    """True if the targets of any two marks are `MARKS_APART_PX` pixels of `SEEN_PX` apart."""
-    places = np.array([mark.position_m for mark in marks])
-    pixels = question_camera(recipe, _STYLE).to_pixels(places, SEEN_PX)
-    return all(math.dist(one, other) >= MARKS_APART_PX for one, other in combinations(pixels, 2))
-
-
 def _hit(block: Block, camera: Camera, pixel: tuple[int, int]) -> tuple[float, float, float] | None:
     """Return where the ray through a pixel first meets the block (Moeller-Trumbore), or None."""
     half = camera.half_tangent

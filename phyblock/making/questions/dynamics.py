@@ -9,8 +9,9 @@ PD: four pictures show the same blocks laid on an unfinished structure, of which
 one or two of the others the plank hangs over less; by how far all leans off the middle of the
 structure it is about as often any of the four.
 
-AD: all places are on two planks in balance. By how far the right one is off the middle of its
-plank, and of the structure, it is about as often any of the four.
+AD: what becomes of the block at each of four places is plain to the eye, and checked with margins.
+The right place takes each rank about equally often by how far it is off the middle of its block, by
+height, and by how near something higher is.
 """
 
 from __future__ import annotations
@@ -25,14 +26,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from phyblock.domain.blocks import (
-    BLOCK_TYPES,
-    COLORS,
-    SHAPES,
-    BlockType,
-    Euler,
-    euler_deg_to_matrix,
-)
+from phyblock.domain.blocks import COLORS, SHAPES, BlockType
 from phyblock.domain.question import LETTERS, Mark, Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
 from phyblock.making.questions import base, sight
@@ -40,32 +34,32 @@ from phyblock.making.questions.base import Draft, Floats, Maker, UnfairError, Vi
 from phyblock.making.questions.structures import (
     SPARE_M,
     THIN_M,
-    UNIT_M,
+    WEIGHTS,
     WIDE_M,
     Bench,
     bench,
     free_tops,
     group_of,
+    is_square,
     is_sure,
     lots_of,
     lowered,
     lowered_round,
+    pillars,
     stage,
     stays_round,
     surely_stays,
     verdict,
 )
-from phyblock.making.scenes.sketch import POSES
 from phyblock.sim.balance import is_balanced, surely_stands
 from phyblock.sim.camera import view_axes
-from phyblock.sim.contact import bounds_m, support_graph
+from phyblock.sim.contact import GROUND, Turned, bounds_m, support_graph, whole_bounds_m
+from phyblock.sim.contact import at as at_place
 from phyblock.sim.dynamics import groups
-from phyblock.sim.geometry import drawn_mesh
 from phyblock.sim.outcomes import LEAN_DEG, Outcome, after_removal
-from phyblock.sim.pictures import drawn_m
 from phyblock.sim.question_pictures import (
     BLOCK_LABEL,
-    are_apart,
+    MARKS_APART_PX,
     block_mark,
     is_inside,
     mark_pixel,
@@ -393,10 +387,27 @@ def _can_follow(shown: QuestionPicture, option: QuestionPicture) -> bool:
 
 Place = tuple[float, float, float]
 """A point of the world [m]."""
-_PLACE_RING_M = 0.005
-"""The verdict on a place holds all round it, this far off [m]."""
-_STRUCTURES_TRIED, _LEAST_APART_M, _ROUND_PX, _CLEAR_M = 80, 0.025, 2, 0.006
-_OFF_CENTER_M, _MOST_OF_A_FACE = 0.001, 0.8
+STAYS, IN_THE_WAY, TIPS = range(1, 4)
+"""What happens to a block that is set down: it stays; it comes down on a neighbor first, and tips
+off that; it tips what it is set on."""
+_PLACE_RING_M, _WIDE_RING_M = 0.005, 0.01
+"""The verdict on a place holds all round it, this far off; in proposals farther [m]."""
+_STRUCTURES_TRIED, _AREA_M2, _ROUND_PX = 60, 0.0003, 2
+_MOST_OF_SCENE, _ADDED, _BESIDE = 3, (8, 13), (0, 2)
+"""The most blocks that are taken of a scene; how many are added, and beside or on each plank."""
+_LONG: tuple[BlockType, ...] = ("cuboid2", "cuboid3")
+_SET_DOWN = [(one, euler) for one in _LONG for euler in SHAPES[one].poses.values()]
+"""The blocks that are set down, with their poses."""
+_AWAY_M, _GAPS_M, _ODDS_ON = (0.075, 0.125), (0.0, 0.0125, 0.025, 0.0375), 0.25
+_SIDES_OF_SCENE = [(x, y) for x, y in itertools.product((-1, 0, 1), repeat=2) if x or y]
+_PILLARS_M: tuple[tuple[tuple[float, ...], float], ...] = (
+    *(((-0.005,), THIN_M), ((0.005,), THIN_M), ((-0.0175,), WIDE_M), ((0.0175,), WIDE_M)),
+    *(((-0.05, 0.05), THIN_M), ((-0.0375, 0.05), THIN_M), ((-0.05, 0.05), WIDE_M), ((), THIN_M)),
+)
+"""How far off the middle of a plank its pillars are, and how thick."""
+_VIEWED_FROM_DEG, _PLAINLY_ACROSS, _HANGS_M, _HELD_M = (24, 38), 0.85, 0.02, 0.0075
+_INSIDE_M, _CLEAR_M = 0.01, 0.025
+_OVER_M, _OUT_M, _LEANS_OUT_M, _OFF_CONTACT_M = 0.005, 0.0225, 0.0075, 0.01
 _SAME_HEIGHT_M, _CLEARLY_HIGHER_M = 0.001, 0.01
 
 
@@ -404,14 +415,14 @@ class AffordanceMaker(Maker):
     """Kind: `ad-place`."""
 
     subtask: Subtask = "AD"
-    spare, doubtful = 2.5, 2.0
-    drafts_a_scene = 8
+    spare, doubtful = 2.5, 1.2
+    drafts_a_scene = 3
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """Propose a block in a pose drawn, one place where it stays, and three where not."""
         for _ in range(self.drafts_a_scene):
-            ranks = (int(rng.integers(len(LETTERS))), int(rng.integers(len(LETTERS))))
-            tried = (_set_down(scene, ranks, rng) for _ in range(_STRUCTURES_TRIED))
+            rank = int(rng.integers(len(LETTERS)))
+            tried = (_set_down(scene, rank, rng) for _ in range(_STRUCTURES_TRIED))
             yield from itertools.islice(itertools.chain.from_iterable(tried), 1)
 
     def rederive(self, question: Question) -> tuple[int, ...]:
@@ -421,8 +432,8 @@ class AffordanceMaker(Maker):
         if len(alone.blocks) != 1:
             raise UnfairError("the second picture is not of one block")
         block = alone.blocks[0]
-        if slots.get("size") != _size(block) or not shows_solid(block, alone.view_deg):
-            raise UnfairError("the block is not as large as told, or does not show its shape")
+        if slots.get("size") != _size(block):
+            raise UnfairError("the block is not as large as told")
         sight.require_seen(shown, _ALL_SEEN)
         plain, stays = replace(shown, marks=()), []
         for letter in LETTERS:
@@ -436,149 +447,209 @@ class AffordanceMaker(Maker):
         return base.only_index(stays)
 
 
-def _set_down(scene: Scene, ranks: Ranks, rng: np.random.Generator) -> Iterator[Draft]:
-    """Yield a question about places on two planks on the scene, as far as some fit."""
-    blocks, view = stage(scene, rng), base.drawn_view(rng)
-    block = _drawn_block(0, view, rng)
-    spots: list[Spot] = []
-    tops = free_tops(blocks)
-    for top in shuffled(rng, tops)[:2] if len(tops) > 1 else ():
-        first = max(sight.orders_of((*scene.blocks, *blocks))) + 1
-        on = bench(blocks, top, int(rng.integers(2)), pick(rng, (THIN_M, WIDE_M)), first, rng)
-        plans = on.plans_m(_PLANS, rng)
-        plans = plans[np.abs(on.leans_m(plans)) <= on.limits_m[0]]
-        # Planks that hang over far have more places where a block stays off their middle.
-        plans = plans[np.abs(plans[:, 0]).argsort(kind="stable")][len(plans) * 2 // 3 :]
-        laid = on.laid(pick(rng, plans.tolist())) if len(plans) else None
-        if laid is None:
-            return
-        spots += free_spots(on, laid, block)
-        blocks = laid
-    four = four_spots(spots, blocks, view, ranks, rng)
-    plain = QuestionPicture("scene", blocks, view)
-    marks = [Mark("A", spot.place) for spot in four]
-    if not marks or not _are_shown(plain, marks):
+def _set_down(scene: Scene, rank: int, rng: np.random.Generator) -> Iterator[Draft]:
+    """Yield at most one question about places on part of a scene and on planks round it.
+
+    Of the three wrong places, `rank` are nearer to the middle of their block than the right one.
+    """
+    view = base.drawn_view(rng, _VIEWED_FROM_DEG)
+    across = np.abs(view_axes(*view)[0])
+    if across.max() < _PLAINLY_ACROSS:
         return
-    block = replace(block, order=max(sight.orders_of(blocks)) + 1)
-    puts = [lowered(block, blocks, *spot.place[:2]) for spot in four]
-    if (
-        all(is_on_face(plain, put, spot.place) for put, spot in zip(puts, four, strict=True))
-        and all(map(surely_stands, groups(blocks)))
-        and [surely_stays((*blocks, put), put.order) for put in puts] == _ONE_STAYS
-        and stays_leaning((*blocks, puts[0]), block.order)
-    ):
-        shown = (plain, QuestionPicture(BLOCK_LABEL, (block,), view))
-        facts = {"block": block.type, "euler": list(block.euler_deg)}
-        slots, kind = {"size": _size(block)}, f"ranks {ranks}"
-        yield Draft(scene, "ad-place", tuple(marks), shown, slots, facts, kind)
+    blocks = _built_round(scene, int(across.argmax()), rng)
+    plain = QuestionPicture("scene", blocks, view)
+    if not is_inside(plain) or not sight.are_seen(plain, sight.orders_of(blocks), _ALL_SEEN):
+        return
+    points, order = points_of(plain, rng), max(sight.orders_of(blocks)) + 1
+    for pose in shuffled(rng, _SET_DOWN):
+        block = replace(at_place(pose), order=order, color=pick(rng, COLORS))
+        four, kind = four_of(plain, points, outcomes_of(blocks, block, points), rank, rng)
+        if not four:
+            continue
+        if not all(map(surely_stands, groups(blocks))):
+            return
+        marks = tuple(Mark("A", (x, y, z)) for x, y, z in points.at_m[four].tolist())
+        puts = [lowered(block, blocks, *mark.position_m[:2]) for mark in marks]
+        if [stays_round(put, blocks, _WIDE_RING_M) for put in puts] == _ONE_STAYS:
+            shown = (plain, QuestionPicture(BLOCK_LABEL, (block,), view))
+            facts = {"block": block.type, "euler": list(block.euler_deg)}
+            yield Draft(scene, "ad-place", marks, shown, {"size": _size(block)}, facts, kind)
+            return
 
 
-class Spot(NamedTuple):
-    """A point on the plank of a bench, and how far it is off the middle of the plank.
+def _built_round(scene: Scene, across: int, rng: np.random.Generator) -> tuple[Block, ...]:
+    """Return the first blocks of a scene, with planks set up round them.
 
-    By a lever a block put there stays, or falls, or neither is sure.
+    Those planks that hang over a pillar do so along the axis that runs `across` the view.
     """
-
-    place: Place
-    off_center_m: float
-    stays: bool
-    falls: bool
-
-
-def free_spots(on: Bench, laid: Sequence[Block], block: Block) -> Iterator[Spot]:
-    """Yield spots on the plank, as it was laid, where a block has room beside the weights."""
-    (near, far), mass_kg = on.limits_m, SHAPES[block.type].mass_kg
-    boxes = [bounds_m(one) for one in laid[len(on.base) :]]
-    offs_m = np.array([box.mean(axis=0) for box in boxes]) - bounds_m(on.top).mean(axis=0)
-    offs_m, middle = offs_m[:, on.along], [*boxes[0].mean(axis=0)[:2], boxes[0][1, 2]]
-    room_m = (on.lengths_m[1:] + np.ptp(bounds_m(block)[:, on.along])) / 2 + _CLEAR_M
-    most = round(float(on.lengths_m[0]) / UNIT_M / 2) - 1
-    for step, aside in itertools.product(range(-most, most + 1), (-1, 0, 1)):
-        off_m = offs_m[0] + step * UNIT_M
-        if (np.abs(offs_m[1:] - off_m) >= room_m).all():
-            lean_m = abs(offs_m @ on.masses_kg + mass_kg * off_m) / (on.masses_kg.sum() + mass_kg)
-            at = np.array(middle)
-            at[[on.along, 1 - on.along]] += (step * UNIT_M, aside * UNIT_M)
-            x, y, z = np.round(at, 6).tolist()
-            off_center_m = math.hypot(step, aside) * UNIT_M
-            yield Spot((x, y, z), off_center_m, bool(lean_m <= near), bool(lean_m >= far))
+    count, more = int(rng.integers(2, _MOST_OF_SCENE + 1)), int(rng.integers(*_ADDED))
+    blocks = tuple(scene.blocks[i] for i in sorted(scene.graph.random_order(rng)[:count]))
+    low, high = whole_bounds_m(blocks)[:, :2]
+    order = max(sight.orders_of(scene.blocks)) + 1
+    for side in shuffled(rng, _SIDES_OF_SCENE):
+        if len(blocks) < count + more:
+            away_m = (high - low) / 2 + rng.uniform(*_AWAY_M, size=2)
+            blocks = _with_plank(blocks, (low + high) / 2 + away_m * side, order, across, rng)
+            order = max(order, max(sight.orders_of(blocks)) + 1)
+    return blocks
 
 
-def four_spots(
-    spots: Sequence[Spot],
-    blocks: Sequence[Block],
-    view: View,
-    ranks: Ranks,
-    rng: np.random.Generator,
-) -> list[Spot]:
-    """Return four spots, apart as they are seen, of which a block stays on the first only; empty
-    where there are no such.
-
-    Its ranks are by how far it is off the middle of its plank, and of the structure.
+def _with_plank(
+    blocks: tuple[Block, ...], at_m: Floats, first: int, across: int, rng: np.random.Generator
+) -> tuple[Block, ...]:
+    """Return blocks with a plank on up to two pillars, and further ones beside it or on it; as they
+    were where one of these would not plainly stay.
     """
-    stays, falls = (np.array([spot[i] for spot in spots], dtype=bool) for i in (2, 3))
-    fours = one_stays(stays, falls, rng)
-    if not len(fours):
-        return []
-    places_m = np.array([spot.place for spot in spots])
-    seen_m = places_m @ np.array(view_axes(*view)[:2]).T
-    apart_m = np.linalg.norm(seen_m[:, None] - seen_m, axis=2)
-    for i, j in itertools.combinations(range(len(LETTERS)), 2):
-        fours = fours[apart_m[fours[:, i], fours[:, j]] >= _LEAST_APART_M]
-    corners = np.concatenate([bounds_m(block) for block in blocks])
-    middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
-    out_m = np.linalg.norm((places_m - middle)[:, :2], axis=1)
-    off_m = np.array([spot.off_center_m for spot in spots])
-    fitting = (ranks_of(off_m[fours]) == ranks[0]) & (ranks_of(out_m[fours]) == ranks[1])
-    return [spots[i] for i in pick(rng, fours[fitting].tolist())] if fitting.any() else []
+    offs_m, thick_m = pick(rng, _PILLARS_M)
+    along = across if len(offs_m) == 1 else int(rng.integers(2))
+    pillar: Turned = pick(rng, pillars(along, thick_m))
+    plank: Turned = ("cuboid3", (0.0, 0.0, 90.0 * along))
+    on_m = [at_m + off_m * np.eye(2)[along] for off_m in offs_m]
+    parts: list[tuple[Turned, Floats]] = [*((pillar, one) for one in on_m), (plank, at_m)]
+    for _ in range(int(rng.integers(*_BESIDE))):
+        other = pick(rng, WEIGHTS)
+        sizes = [np.ptp(bounds_m(at_place(one)), axis=0)[:2] for one in (plank, other)]
+        off_m = (sizes[0] + sizes[1]) / 2 + pick(rng, _GAPS_M)
+        off_m[int(rng.integers(2))] *= rng.random()
+        beside_m = at_m + off_m * rng.choice((-1, 1), size=2)
+        is_on = rng.random() < _ODDS_ON
+        parts.append((other, pick(rng, on_m or [at_m]) if is_on else beside_m))
+    laid = blocks
+    for order, (pose, (x, y)) in enumerate(parts, first):
+        block = replace(at_place(pose), order=order, color=pick(rng, COLORS))
+        laid = (*laid, lowered(block, laid, x, y))
+        below, middle = _below(laid), bounds_m(laid[-1]).mean(axis=0)
+        is_held = _out_m(middle[None], *_borne_by(laid[-1], laid, below))[0] <= -_HELD_M
+        is_own = order <= first + len(offs_m) or below[order] <= {GROUND, *range(first, order)}
+        if not is_held or not is_own:
+            return blocks
+    return laid
 
 
-def _are_shown(plain: QuestionPicture, marks: Sequence[Mark]) -> bool:
-    """True if all blocks show, and each mark is well inside of one, apart from the others."""
-    if not is_inside(replace(plain, marks=tuple(marks))) or not are_apart(plain, marks):
-        return False
-    for mark in marks:
-        row, column = mark_pixel(plain, mark.position_m)
-        rows, columns = (slice(at - _ROUND_PX, at + _ROUND_PX + 1) for at in (row, column))
-        near = seen(plain).block[rows, columns]
-        if near.min() < 0 or near.min() < near.max():
-            return False
-    return sight.are_seen(plain, sight.orders_of(plain.blocks), _ALL_SEEN)
+class Points(NamedTuple):
+    """Points [m], (n, 3), and the index of the block that each is on."""
+
+    at_m: Floats
+    on: Ints
 
 
-def _drawn_block(order: int, view: View, rng: np.random.Generator) -> Block:
-    """Return a block to put down, in a pose whose shape the view shows."""
-    while True:
-        block_type, euler = pick(rng, _balanced_poses())
-        block = Block(order, block_type, pick(rng, COLORS), (0.0, 0.0, 0.0), euler, (), 1)
-        if shows_solid(block, view):
-            return block
+def points_of(plain: QuestionPicture, rng: np.random.Generator) -> Points:
+    """Return points drawn on flat tops of boxes, well inside, where the picture shows them, what
+    bears the box, and, from the side, how far it hangs over.
+    """
+    below, shot = _below(plain.blocks), seen(plain).block
+    across = np.abs(view_axes(*plain.view_deg)[0][:2])
+    at_m, on = list[Place](), list[int]()
+    for i, block in enumerate(plain.blocks):
+        box = bounds_m(block)[:, :2]
+        room = np.ptp(box, axis=0) - 2 * _INSIDE_M
+        hangs = np.abs(_borne_by(block, plain.blocks, below) - box).max(axis=0) > _HANGS_M
+        if (
+            not (SHAPES[block.type].is_box and is_square(block) and room.min() > 0)
+            or across[hangs].min(initial=1.0) < _PLAINLY_ACROSS
+            or not sight.are_seen(plain, sight.all_below(block.order, below), sight.COUNTED)
+        ):
+            continue
+        count = math.ceil(np.ptp(box, axis=0).prod() / _AREA_M2)
+        for x, y in (box[0] + _INSIDE_M + room * rng.random((count, 2))).round(4).tolist():
+            at = (x, y, float(bounds_m(block)[1, 2]))
+            rows, columns = (slice(n - _ROUND_PX, n + _ROUND_PX + 1) for n in mark_pixel(plain, at))
+            if (shot[rows, columns] == i).all():
+                at_m.append(at)
+                on.append(i)
+    return Points(np.array(at_m).reshape(-1, 3), np.array(on, dtype=np.int64))
 
 
-@functools.cache
-def _balanced_poses() -> list[tuple[BlockType, Euler]]:
-    """Return poses that stand, with the center of mass under the middle seen from above."""
-    poses = []
-    for block_type in BLOCK_TYPES:
-        for euler in POSES[block_type].values():
-            block = lowered(Block(1, block_type, "red", (0.0, 0.0, 0.0), euler, (), 1), (), 0, 0)
-            center = euler_deg_to_matrix(euler) @ np.array(SHAPES[block_type].center_of_mass_m)
-            is_central = np.abs(center[:2] + block.position_m[:2]).max() < _OFF_CENTER_M
-            if is_central and surely_stands((block,)):
-                poses.append((block_type, euler))
-    return poses
+def outcomes_of(blocks: tuple[Block, ...], block: Block, points: Points) -> Ints:
+    """Return what plainly happens to a block set down at each point; 0 where that is not plain.
+
+    A person can tell by eye that the block keeps 2.5 cm from all that is higher than the point, or
+    overlaps something by as much; and that what it is set on has supports under the point, or on
+    both sides of it, or bears nothing else and has none within 2.25 cm.
+    """
+    boxes = np.array([bounds_m(one) for one in blocks])
+    (low, high), at = (boxes[:, i, :2] for i in (0, 1)), points.at_m[:, None]
+    half = np.ptp(bounds_m(block), axis=0)[:2] / 2
+
+    def meets(reach_m: Floats | float, above_m: float = _SAME_HEIGHT_M) -> NDArray[np.bool_]:
+        """True for points as near to a block that is so much higher, (points,)."""
+        near = (low < at[..., :2] + reach_m) & (high > at[..., :2] - reach_m)
+        is_met = near.all(axis=2) & (boxes[:, 1, 2] > at[..., 2] + above_m)
+        return np.asarray(is_met.any(axis=1))
+
+    is_clear = ~meets(half + _CLEAR_M)
+    is_blocked = meets(half - _CLEAR_M, _CLEARLY_HIGHER_M) & ~meets(_OFF_CONTACT_M)
+    # Whether what it is set on holds.
+    below, xy = _below(blocks), points.at_m[:, :2]
+    borne = np.array([_borne_by(one, blocks, below) for one in blocks])[points.on].swapaxes(0, 1)
+    masses = np.array([SHAPES[one.type].mass_kg for one in (block, *blocks)])
+    share = (masses[0] / (masses[0] + masses[1:]))[points.on, None]
+    leans = share * xy + (1 - share) * boxes.mean(axis=1)[points.on, :2]
+    is_loaded = np.array([any(one.order in under for under in below.values()) for one in blocks])
+    tips = (_out_m(xy, *borne) >= _OUT_M) & (_out_m(leans, *borne) >= _LEANS_OUT_M)
+    is_held = _out_m(xy, *borne) <= -_OVER_M
+    cases = [is_blocked, is_clear & is_held, is_clear & tips & ~is_loaded[points.on]]
+    return np.select(cases, [IN_THE_WAY, STAYS, TIPS], 0)
 
 
-def shows_solid(block: Block, view: View) -> bool:
-    """True if a view shows its profile, and no one face is nearly all that shows of the block."""
-    along = view_axes(*view)[2]
-    corners = drawn_m(block)[drawn_mesh(block.type).triangles]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    shown = np.maximum(-normals @ along, 0.0)
-    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    _, faces = np.unique(np.round(normals / lengths, 2), axis=0, return_inverse=True)
-    largest = np.bincount(faces.ravel(), shown).max() / shown.sum()
-    return sight.shows_profile(block, view) and bool(largest <= _MOST_OF_A_FACE)
+def _borne_by(block: Block, blocks: Sequence[Block], below: sight.Below) -> Floats:
+    """Return the corners (2, 2) of the box round what bears a block, seen from above [m]."""
+    box = bounds_m(block)[:, :2]
+    under = [bounds_m(one)[:, :2] for one in blocks if one.order in below[block.order]]
+    if GROUND in below[block.order] or not under:
+        return box
+    ends = np.array(under)
+    borne: Floats = np.clip([ends[:, 0].min(axis=0), ends[:, 1].max(axis=0)], *box)
+    return borne
+
+
+def _out_m(at_m: Floats, low_m: Floats, high_m: Floats) -> Floats:
+    """Return how far points are outside of boxes seen from above, below 0 inside [m]."""
+    outside: Floats = np.maximum(low_m - at_m[:, :2], at_m[:, :2] - high_m).max(axis=1)
+    return outside
+
+
+def four_of(
+    plain: QuestionPicture, points: Points, outcomes: Ints, rank: int, rng: np.random.Generator
+) -> tuple[list[int], str]:
+    """Return points on four blocks, of which the first is right, and their kind; empty where there
+    are none.
+
+    The kind has the ranks of the right one: the given one by how far it is off the middle of its
+    block, by height, and by how far the nearest block is that is higher.
+    """
+    falls, tips = outcomes > STAYS, int((outcomes == TIPS).sum())
+    if tips:
+        # As many where it tips as where something is in the way.
+        falls[rng.permutation(np.flatnonzero(outcomes == IN_THE_WAY))[tips:]] = False
+    fours = one_stays(outcomes == STAYS, falls, rng)
+    pixels = np.array([mark_pixel(plain, at) for at in points.at_m.tolist()]).reshape(-1, 2)
+    pairs = list(itertools.combinations(fours.T, 2))
+    apart = np.array([np.linalg.norm(pixels[i] - pixels[j], axis=1) for i, j in pairs])
+    is_other = np.array([points.on[i] != points.on[j] for i, j in pairs])
+    fours = fours[(apart.min(axis=0) >= MARKS_APART_PX) & is_other.all(axis=0)]
+    ranks = np.array([ranks_of(one[fours]) for one in _measures_of(plain.blocks, points, rng)]).T
+    is_fit = (ranks.min(axis=1) >= 0) & (ranks[:, 0] == rank)
+    if not is_fit.any():
+        return [], ""
+    kinds, of_kind = np.unique(ranks[is_fit], axis=0, return_inverse=True)
+    odds = (len(LETTERS) - kinds[:, 2]) ** 2
+    kind = int(rng.choice(len(kinds), p=odds / odds.sum()))
+    found: list[int] = pick(rng, fours[is_fit][of_kind.ravel() == kind]).tolist()
+    return found, f"ranks {kinds[kind].tolist()}"
+
+
+def _measures_of(blocks: Sequence[Block], points: Points, rng: np.random.Generator) -> Floats:
+    """Return how far points are off the middle of their block, how high, and how far the nearest
+    block is that is higher, (3, n) [m]; points less than half a millimeter apart come in an order
+    drawn.
+    """
+    boxes, at_m = np.array([bounds_m(block) for block in blocks]), points.at_m
+    off_m = np.linalg.norm((at_m - boxes.mean(axis=1)[points.on])[:, :2], axis=1)
+    gaps_m = np.maximum(boxes[:, 0] - at_m[:, None], at_m[:, None] - boxes[:, 1])[..., :2]
+    is_higher = boxes[:, 1, 2] > at_m[:, 2:] + _SAME_HEIGHT_M
+    near_m = np.where(is_higher, np.linalg.norm(gaps_m.clip(0), axis=2), 1.0).min(axis=1)
+    return np.array([off_m, at_m[:, 2], near_m]) + rng.random((3, len(at_m))) * 2 * SPARE_M
 
 
 def _size(block: Block) -> str:
@@ -591,36 +662,12 @@ def _size(block: Block) -> str:
 def stays_at(plain: QuestionPicture, block: Block, at: Place) -> bool | None:
     """True if the block stays at a place, by simulation too, and likewise up to 5 mm off.
 
-    None where that is not sure, where it is not sure on which face it comes down, and where it
-    stays on another than the one that is marked.
+    None where that is not sure, and where it stays on something else than what is marked.
     """
     put = lowered(block, plain.blocks, *at[:2])
-    around = lowered_round(put, plain.blocks, _PLACE_RING_M)
-    is_on = is_on_face(plain, put, at)
-    if is_on is None or any(_is_as_high(one, at) is not is_on for one in around):
-        return None
     stays = stays_round(put, plain.blocks, _PLACE_RING_M)
-    if verdict((*plain.blocks, put), put.order) is not stays or (stays and not is_on):
+    if verdict((*plain.blocks, put), put.order) is not stays:
         return None
-    return stays
-
-
-def is_on_face(plain: QuestionPicture, put: Block, at: Place) -> bool | None:
-    """True if a block let down at a place came down on the marked face, as without others.
-
-    False if it met a neighbor clearly before; None where neither is so.
-    """
-    is_as_high = _is_as_high(put, at)
-    if not is_as_high:
-        return is_as_high
-    under = seen_order(plain, seen(plain), at)
-    alone = [one for one in plain.blocks if one.order == under]
-    return True if _is_as_high(lowered(put, alone, *at[:2]), at) else None
-
-
-def _is_as_high(put: Block, at: Place) -> bool | None:
-    """True if a block has come down as far as a place; None where it is lower, or hardly higher."""
-    above_m = float(bounds_m(put)[0, 2]) - at[2]
-    if abs(above_m) < _SAME_HEIGHT_M:
-        return True
-    return False if above_m > _CLEARLY_HIGHER_M else None
+    around = (put, *lowered_round(put, plain.blocks, _PLACE_RING_M))
+    heights_m = [abs(float(bounds_m(one)[0, 2]) - at[2]) for one in around]
+    return None if stays and max(heights_m) > _SAME_HEIGHT_M else stays

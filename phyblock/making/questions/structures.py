@@ -38,7 +38,7 @@ _MOST_LEFT_OUT = 5
 _FLAT_M, _LEAST_TOP_M, _HIGHEST_M = 0.0005, 0.045, 0.2
 _PLANKS: tuple[BlockType, ...] = ("cuboid3", "cuboid3", "cuboid2")
 _FLAT: Euler = (0.0, 0.0, 0.0)
-_WEIGHTS: tuple[tuple[BlockType, Euler], ...] = (
+WEIGHTS: tuple[tuple[BlockType, Euler], ...] = (
     *(("cube", _FLAT), ("cylinder", _FLAT), ("cuboid2", (0.0, 90.0, 0.0))),
     *(("cuboid2", (0.0, 0.0, 90.0)), ("cuboid3", (0.0, 90.0, 0.0))),
 )
@@ -131,14 +131,14 @@ def bench(
     """
     along = int(rng.integers(2))
     if pillar_m:
-        block_type, turned = pick(rng, _pillars(along, pillar_m))
+        block_type, turned = pick(rng, pillars(along, pillar_m))
         pillar = Block(first, block_type, pick(rng, COLORS), (0.0, 0.0, 0.0), turned, (), 1)
         at = bounds_m(top).mean(axis=0)[:2]
         at[along] += int(rng.integers(-1, 2)) * _PILLAR_OFF_M * (pillar_m < WIDE_M)
         top, first = lowered(pillar, base, *at.tolist()), first + 1
         base = (*base, top)
     low, high = bounds_m(top)
-    kinds = [(pick(rng, _PLANKS), _FLAT), *(pick(rng, _WEIGHTS) for _ in range(weights))]
+    kinds = [(pick(rng, _PLANKS), _FLAT), *(pick(rng, WEIGHTS) for _ in range(weights))]
     loose = tuple(
         Block(first + i, block_type, pick(rng, COLORS), (0.0, 0.0, float(high[2])), turned, (), 1)
         for i, (block_type, (roll, pitch, yaw)) in enumerate(kinds)
@@ -150,7 +150,7 @@ def bench(
 
 
 @functools.cache
-def _pillars(along: int, thick_m: float) -> list[tuple[BlockType, Euler]]:
+def pillars(along: int, thick_m: float) -> list[tuple[BlockType, Euler]]:
     """Return blocks to lay a plank on, with their poses, so thick along an axis."""
     return [
         (block_type, euler)
@@ -165,9 +165,13 @@ def _is_flat(block: Block) -> bool:
     corners = corners_m(block.type, block.position_m, block.euler_deg)
     highest = float(corners[:, 2].max())
     top = corners[corners[:, 2] > highest - _FLAT_M, :2]
-    is_square = all(abs(angle % 90.0) < 1e-6 for angle in block.euler_deg)
     is_wide = bool(np.ptp(top, axis=0).min() >= _LEAST_TOP_M)
-    return is_square and is_wide and highest <= _HIGHEST_M
+    return is_square(block) and is_wide and highest <= _HIGHEST_M
+
+
+def is_square(block: Block) -> bool:
+    """True if the sides of a block are square to the axes."""
+    return all(abs(angle % 90.0) < 1e-6 for angle in block.euler_deg)
 
 
 def lowered(block: Block, onto: Sequence[Block], x_m: float, y_m: float) -> Block:
