@@ -87,6 +87,7 @@ class ProgressView:
         self._console = console
         self._tallies: dict[str, Tally] = {}
         self._started_s = self._last_line_s = now()
+        self._has_asked = False
         # Rich reads the environment on every access.
         self._is_terminal = console.is_terminal
         self._shown_s = -math.inf
@@ -121,16 +122,19 @@ class ProgressView:
                 for sample in known:
                     tally.add(sample)
         elif isinstance(event, SampleDone):
+            self._has_asked = True
             tally = self._tallies[event.record.model]
             tally.add(event.record)
             self._progress.advance(tally.task.id)
         elif isinstance(event, ModelEvent) and event.kind == "retry":
+            self._has_asked = True
             tally = self._tallies[event.model]
             tally.retries += 1
             if tally.retries == 1:
                 wait = f"waiting {round(event.wait_s, 1):g} s; more are counted as sent again"
                 self._print(f"{event.model}: {event.message}; {wait}")
         elif isinstance(event, ModelEvent):
+            self._has_asked = True
             self._print(f"{event.model}: {event.message}")
         elif isinstance(event, ModelStopped):
             task = self._tallies[event.model].task
@@ -142,11 +146,13 @@ class ProgressView:
         if not isinstance(event, SampleDone) or self._now() - self._shown_s >= _SHOWN_EVERY_S:
             self.tick()
 
-    def tick(self) -> None:
-        """Print due lines; called several times a second."""
+    def tick(self, asks: bool = False) -> None:
+        """Print due lines; called several times a second. `asks`: calls are in progress."""
         self._shown_s = now_s = self._now()
+        self._has_asked |= asks
+        preparing = "" if self._has_asked else self._preparing(now_s)
         for tally in self._tallies.values():
-            self._progress.update(tally.task.id, facts=tally.facts)
+            self._progress.update(tally.task.id, facts=preparing or tally.facts)
         if not self._is_terminal and now_s - self._last_line_s >= LINE_EVERY_S:
             self._last_line_s = now_s
             self._print(self._line(now_s))
@@ -168,8 +174,13 @@ class ProgressView:
         with contextlib.suppress(OSError):
             self._console.print(Text(one_line(line), style=style))
 
+    def _preparing(self, now_s: float) -> str:
+        return f"Preparing scenes ... ({_duration(now_s - self._started_s)})"
+
     def _line(self, now_s: float) -> str:
         """Return the progress of the run as a line."""
+        if not self._has_asked:
+            return self._preparing(now_s)
         tallies = list(self._tallies.values())
         done = sum(int(tally.task.completed) for tally in tallies)
         total = sum(int(tally.task.total or 0) for tally in tallies)

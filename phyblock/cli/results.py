@@ -41,7 +41,7 @@ _FAILURES = 4
 @click.option("--only", "names", multiple=True, metavar="NAME", help="With --print: this table.")
 @click.option(
     *("--format", "form"),
-    type=click.Choice(["text", "tex"]),
+    type=click.Choice(["text", "md", "tex"]),
     default="text",
     help="With --print: how.",
 )
@@ -58,7 +58,7 @@ def report(run: Path, prints: bool, names: tuple[str, ...], form: str, data: Pat
         return
     from phyblock.results.load import load_run
     from phyblock.results.tables import make_tables, table_names
-    from phyblock.results.text import to_latex
+    from phyblock.results.text import to_latex, to_markdown
 
     loaded = load_run(run)
     _check_names(run, names, table_names(loaded), "table")
@@ -69,7 +69,7 @@ def report(run: Path, prints: bool, names: tuple[str, ...], form: str, data: Pat
         if form == "text":
             print_table(console, table)
         else:
-            click.echo(to_latex(table, f"phyblock-{name}"))
+            click.echo(to_markdown(table) if form == "md" else to_latex(table, f"phyblock-{name}"))
 
 
 def _check_names(run: Path, names: Sequence[str], known: Iterable[str], noun: str) -> None:

@@ -284,7 +284,9 @@ def _fault(detail: ErrorDetails, path: FieldPath, value: Any, model: type[BaseMo
         return Fault(message, found="", hint=f"add {name}: ...", key=True)
     if kind == "extra_forbidden":
         known = _parts(_section(model, path[:-1]))
-        hint = did_you_mean(name, known)
+        homes = (at for at, below in known.items() if any(name in _parts(one) for one in below))
+        home = next(homes, "")
+        hint = f"it belongs at {home}.{name}" if home else did_you_mean(name, known)
         return Fault(message, ", ".join(known), "", hint=hint, key=True)
     hint = ""
     if kind == "literal_error":
@@ -293,11 +295,34 @@ def _fault(detail: ErrorDetails, path: FieldPath, value: Any, model: type[BaseMo
         hint = did_you_mean(value, words) if isinstance(value, str) else ""
     elif kind == "string_pattern_mismatch":
         allowed = _FORMS.get(context["pattern"], context["pattern"])
+    elif kind in ("int_type", "float_type") and shown(value).strip('"').isdecimal():
+        hint = "remove the quotes"
+    elif kind == "string_type" and isinstance(value, int | float):
+        hint = f'put it in quotes: "{value}"'
+    elif kind == "tuple_type" and (listed := _listed(name, value)):
+        hint = f"write a list: {listed}"
+    elif (
+        kind == "model_type" and isinstance(value, str) and "path" in _parts(_section(model, path))
+    ):
+        hint = f"write {name}: {{path: {value}}}"
     else:
         allowed = allowed.format_map(context)
     if "[key]" in detail["loc"]:
         return Fault(message, allowed, shown(name), key=True)
     return Fault(message, allowed, hint=hint)
+
+
+def _listed(name: str, value: Any) -> str:
+    """Return the list that a value without brackets probably means, or "" if unclear."""
+    if type(value) is int and name == "seeds":
+        return str([*range(value)]) if 0 < value <= 10 else ""
+    if type(value) is int:
+        return str([value])
+    if not isinstance(value, str):
+        return ""
+    if ends := re.fullmatch(r"(\d{1,2}) *- *(\d{1,2})", value):
+        return str([*range(int(ends[1]), int(ends[2]) + 1)])
+    return f"[{value}]" if re.search("[A-Za-z,]", value) else ""
 
 
 def _section(model: type[BaseModel], path: FieldPath) -> type[BaseModel]:

@@ -310,7 +310,7 @@ def table_files() -> tuple[str, ...]:
     """Return the names of all files of tables that a run folder may hold."""
     names = [name for track, kind in kinds().items() for name in kind.report().tables or (track,)]
     names += [*(f"{track}_measures" for track in kinds()), *_FURTHER]
-    made = (f"{TABLES}/{name}.{form}" for form in ("csv", "tex") for name in names)
+    made = (f"{TABLES}/{name}.{form}" for form in ("csv", "md", "tex") for name in names)
     return (f"{TABLES}/estimates.csv", *made)
 
 

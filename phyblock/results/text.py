@@ -1,4 +1,4 @@
-"""Tables as text, CSV and LaTeX; the summary of a run for the terminal."""
+"""Tables as text, CSV, Markdown and LaTeX; the summary of a run for the terminal."""
 
 from __future__ import annotations
 
@@ -76,9 +76,10 @@ class TextTable:
         return cls(caption, tuple(columns), tuple(rows), tuple(notes), frame)
 
     def files(self, name: str, label: str, float_format: str = "%.6f") -> dict[str, str | bytes]:
-        """Return the table as CSV and LaTeX, by file name."""
+        """Return the table as CSV, Markdown and LaTeX, by file name."""
         return {
             f"{name}.csv": to_csv(self.frame, float_format),
+            f"{name}.md": to_markdown(self),
             f"{name}.tex": to_latex(self, f"phyblock-{label}"),
         }
 
@@ -186,6 +187,23 @@ _LIGATURE = re.compile("-(?=-)")
 def escape(text: str) -> str:
     """Return text as LaTeX prints it literally."""
     return _LIGATURE.sub("-{}", text.translate(_ESCAPES_LATEX))
+
+
+_ESCAPES = str.maketrans({c: f"\\{c}" for c in "\\`*_[]<>|#~$"} | {"&": "&amp;", "\n": " "})
+
+
+def to_markdown(table: TextTable) -> str:
+    """Return the caption in bold, the table, and the notes as a list.
+
+    Group headings join the column names, because Markdown has one heading row.
+    """
+    head = (f"{column.group} {column.name}".strip() for column in table.columns)
+    rule = ["---" if column.is_text else "--:" for column in table.columns]
+    rows = [[text.translate(_ESCAPES) for text in row] for row in (tuple(head), *table.rows)]
+    lines = "\n".join(f"| {' | '.join(row)} |" for row in (rows[0], rule, *rows[1:]))
+    notes = "\n".join(f"- {note.translate(_ESCAPES)}" for note in table.notes)
+    parts = (f"**{table.caption.translate(_ESCAPES)}**", lines, notes)
+    return "\n\n".join(filter(None, parts)) + "\n"
 
 
 @functools.cache

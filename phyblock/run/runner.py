@@ -465,12 +465,13 @@ _NAP_S = 0.1
 def completed(
     session: Session,
     signals: Collection[signal.Signals] = (signal.SIGINT,),
-    tick: Callable[[], object] = lambda: None,
+    tick: Callable[[bool], object] = lambda _: None,
 ) -> RunResult:
     """Run a session to its end in a separate thread, since a notebook's thread already has a loop.
 
     After the first signal it sends nothing more, the second gives up calls in progress; all replies
-    are on disk when this returns. `tick` is called several times a second.
+    are on disk when this returns. `tick` is called several times a second, with True while calls
+    are in progress.
     """
     loop, stops = asyncio.new_event_loop(), 0
     whole: asyncio.Task[RunResult] | None = None
@@ -505,7 +506,7 @@ def completed(
             running = pool.submit(in_thread)
             try:
                 while not wait((running,), _NAP_S).done:
-                    tick()
+                    tick(session.under_way > 0)
             except BaseException:
                 # A program's handlers of other signals may raise anything.
                 stop()

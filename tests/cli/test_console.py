@@ -135,3 +135,9 @@ def test_a_log_tells_of_retries_servers_failures_and_models_that_are_stopped():
         "alpha stopped: HTTP 401: no",
         "1 of 1 sample after 22 s, 1 api error, 3 sent again",
     ]
+
+
+def test_until_anything_is_asked_scenes_are_being_prepared():
+    lines = logged((12, None), (20, done()), (31, None))
+    assert lines[0] == "Preparing scenes ... (12 s)"
+    assert lines[-1].startswith("1 of 10 samples after 31 s")

@@ -12,7 +12,7 @@ from phyblock.files import LIST
 from phyblock.results.compare import compare_models, write_comparison
 from phyblock.results.load import load_run, track_measures
 from phyblock.results.tables import coverage_frame, make_tables, summary_of, write_tables
-from phyblock.results.text import NO_VALUE, Column, TextTable, number, to_latex
+from phyblock.results.text import NO_VALUE, Column, TextTable, number, to_latex, to_markdown
 from phyblock.tracks.base import kind_of
 from phyblock.types import OUTCOMES
 from tests.results.test_estimates import EPISODES, complete, episodes, questions
@@ -212,3 +212,16 @@ def test_latex_by_hand():
         r"\end{tabular}}}",
         r"\par\smallskip\raggedright\footnotesize",
     ]
+
+
+def test_markdown_by_hand():
+    assert to_markdown(TABLE) == (
+        "**Precision &amp; recall (%)**\n"
+        "\n"
+        "| Model | Level-1 Prec | Level-1 F1 |\n"
+        "| --- | --: | --: |\n"
+        "| gpt\\_4o\\|x | 9.5 | 100.0 ± 12.5 |\n"
+        "| \\[b\\]\\* | \N{EN DASH} | 7.0 ± 0.5 |\n"
+        "\n"
+        "- 100 % of \\<all\\>.\n"
+    )
