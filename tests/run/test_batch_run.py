@@ -36,7 +36,8 @@ def test_all_tracks_of_one_turn_go_out_in_batches_at_half_the_price(workspace):
         costs = []
         for name in ("models.yaml", "singly.yaml"):
             dry = workspace.run("--dry-run", "--models-file", name)
-            costs += re.findall(r"4 calls, about \$([\d.]+) ", dry.out)
+            assert "4 calls, about $" in dry.out
+            costs += re.findall(r"^alpha .* \$([\d.]+)$", dry.out, re.MULTILINE)
         batched, single = map(float, costs)
         assert batched == pytest.approx(single / 2, abs=0.006)  # cents are shown
         done = workspace.completed("--yes")
