@@ -204,7 +204,7 @@ def jobs_option(default: int | None = None) -> Callable[..., Any]:
 def worker_options(jobs: int | None = None) -> Callable[[Any], Any]:
     """Return a decorator that adds the options of parallel commands."""
     on_cluster = "Run on this Ray cluster; local: one with N workers on this machine."
-    as_shard = "Run as shard I of N programs that share the work through OUT.shards."
+    as_shard = "Run as shard I of N programs that share the work through a folder .shards."
     options = (
         jobs_option(jobs),
         click.option("--ray", "ray_address", metavar="ADDRESS", help=on_cluster),

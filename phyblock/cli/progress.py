@@ -22,7 +22,6 @@ from rich.text import Text
 
 from phyblock.cli.console import LINE_EVERY_S
 from phyblock.models.model import ModelEvent
-from phyblock.records.record import Record
 from phyblock.run.runner import (
     ModelStopped,
     RunEvent,
@@ -31,11 +30,11 @@ from phyblock.run.runner import (
     SampleDone,
     Stopping,
 )
+from phyblock.run.store import Summary
 from phyblock.scoring.plan import Counts
 from phyblock.text import counted, one_line
 from phyblock.types import FAILURES
 
-_HEADLINE = "aov"
 _SHOWN_EVERY_S = 0.1
 """Minimum time between two updates of the display [s]."""
 
@@ -52,16 +51,15 @@ class Tally:
     retries: int = 0
     failures: Counter[str] = field(default_factory=Counter)
 
-    def add(self, record: Record) -> None:
+    def add(self, sample: Summary) -> None:
         """Count one sample."""
-        self.failures.update([record.outcome] if record.outcome in FAILURES else [])
-        score = next((one for one in record.scores if one.criterion == _HEADLINE), None)
-        if score is not None:
-            self.counts += Counts(score.tp, score.fp, score.fn)
-        if record.reply is not None:
-            self.cached += record.reply.cached
-            self.unpriced += record.paid_usd is None
-            self.cost_usd += record.paid_usd or 0.0
+        self.failures.update([sample.outcome] if sample.outcome in FAILURES else [])
+        if sample.counts is not None:
+            self.counts += sample.counts
+        if sample.cached is not None:
+            self.cached += sample.cached
+            self.unpriced += sample.paid_usd is None
+            self.cost_usd += sample.paid_usd or 0.0
 
     @property
     def facts(self) -> str:
@@ -124,7 +122,7 @@ class ProgressView:
         elif isinstance(event, SampleDone):
             self._has_asked = True
             tally = self._tallies[event.record.model]
-            tally.add(event.record)
+            tally.add(Summary.of(event.record))
             self._progress.advance(tally.task.id)
         elif isinstance(event, ModelEvent) and event.kind == "retry":
             self._has_asked = True

@@ -201,7 +201,7 @@ def _print_prompt(console: Console, run: Path, record: Record) -> None:
 @models_option("Only these models; of two runs, A of the first.")
 @click.option("--track", metavar="NAME", default="", show_default="the first in both")
 @click.option("--measure", metavar="NAME", default="", show_default="the headline measure")
-@click.option("--out", type=UserPath(), metavar="DIR", help="Folder for CSV and LaTeX.")
+@click.option("--out", type=UserPath(), metavar="DIR", help="Folder for CSV, Markdown and LaTeX.")
 def compare(
     run: Path, other: Path | None, models: Sequence[str], track: str, measure: str, out: Path | None
 ) -> None:
@@ -254,7 +254,7 @@ def figures(
     out: Path | None,
 ) -> None:
     """Draw figures of the folder RUN for a paper: PDF and SVG with real text, PNG for slides, and
-    captions as plain text and LaTeX floats.
+    captions as plain text.
 
     Draws all figures that the run has numbers for, or those named with --only.
     """

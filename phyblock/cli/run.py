@@ -115,7 +115,7 @@ def run(
     if held is not None and not is_as_it_was and not dry_run:
         from phyblock.web.report import files_of
 
-        OutFolder(folder).check(files_of())
+        OutFolder(folder).check(files_of(page=not no_report))
     asks: dict[str, Any] = {"use_cache": not no_cache, "retry_failed": retry_failed}
     if dry_run:
         print_estimate(console, plan, estimate(plan, folder, **asks))
@@ -273,7 +273,7 @@ def play(
     plan = plan_session(read_suite(suite, sets), person, limit)
     folder = out or plan.folder_in(Path("results"))
     if held_run(folder, plan.manifest) is not None:
-        OutFolder(folder).check(files_of())
+        OutFolder(folder).check(files_of(page=True))
     for other in beside:
         load_run(other)
     console = make_console()

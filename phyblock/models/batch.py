@@ -171,7 +171,8 @@ class BatchModel:
         except UnavailableError:
             # This command gets no more news of batches in progress: they count as spent.
             for each in self._batches:
-                self._settle_all(each, None)
+                # A draft was never sent.
+                self._settle_all(each, 0.0 if each.event is None else None)
             raise
         except ModelError as error:
             if batch in self._ended_before and request.sample in self.files.recorded:

@@ -94,7 +94,7 @@ class BatchProvider(ABC):
         try:
             return await self._call(self._status_in, *post)
         except RetryableError as error:
-            if error.sent == "no" or error.status == 429:
+            if error.sent == "no" or error.status in (429, 529):
                 raise
             raise UnavailableError(str(error), status=error.status, sent="maybe") from None
 

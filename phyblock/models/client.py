@@ -35,7 +35,7 @@ from phyblock.errors import (
     UnreachableError,
 )
 from phyblock.files import load_json
-from phyblock.models.request import Request, wire_messages, wire_params
+from phyblock.models.request import Request, json_body, wire_params
 from phyblock.records.record import Reply, Usage
 from phyblock.text import well_formed
 from phyblock.types import Finish
@@ -338,6 +338,7 @@ class HttpClient:
         self._timeout_s = timeout_s
         self._most_bytes = most_bytes or LARGEST_REPLY_BYTES
         self._session: aiohttp.ClientSession | None = None
+        self._proxy_for = functools.cache(_proxy_for)
 
     async def send(
         self, url: str, body: bytes, headers: Mapping[str, str], *, method: str = "POST"
@@ -364,7 +365,7 @@ class HttpClient:
                 yarl.URL(url, encoded=url.isascii()),
                 data=body,
                 headers={**headers, "Accept-Encoding": "gzip, deflate"},
-                proxy=_proxy_for(url),
+                proxy=self._proxy_for(url),
                 allow_redirects=False,
             ) as response:
                 content, fault = await self._read(response)
@@ -427,8 +428,7 @@ class OpenAIClient(Client):
         if seed is not None:
             fields["seed"] = seed
         fields |= extra_body
-        fields["messages"] = wire_messages(request.messages, self.config.image_detail)
-        body = json.dumps(fields, allow_nan=False).encode()
+        body = json_body(fields, request.messages, self.config.image_detail)
         answer = await self.http.send(self._url, body, headers)
         return read_completion(read_json(answer), answer.status)
 

@@ -167,6 +167,8 @@ class RetryPolicy:
 
 MOST_CONNECTION_FAILURES = 10
 """Failures in a row after which a server is given up that has never answered, or not for long."""
+_STARTING_S = 60.0
+"""Time that a server has to start: one that has never answered is not given up earlier [s]."""
 _GATEWAY = (502, 503, 504)
 _TOO_MUCH = (429, 529)
 
@@ -184,6 +186,7 @@ class Server:
     was_heard: bool = False
     failures: int = 0
     failing_since_s: float = 0.0
+    failed_at_s: float = float("-inf")
     cool_at_s: float = float("-inf")
     refusal: UnavailableError | None = None
 
@@ -214,12 +217,22 @@ class Servers:
         return max(0.0, min(s.cool_at_s for s in self.usable()) - self.policy.clock.now())
 
     def pick(self, failed: Server | None = None) -> Server:
-        """Return the server to ask. One that just `failed` the request is the last choice."""
+        """Return the server to ask. One that just `failed` the request is the last choice.
+
+        A server that is away gets one request at a time until it answers.
+        """
         now_s = self.policy.clock.now()
-        return min(
+        chosen = min(
             self.usable(),
             key=lambda s: (max(0.0, s.cool_at_s - now_s), s is failed, s.under_way, s.sent),
         )
+        if chosen.failures > 1:
+            chosen.cool_at_s = max(chosen.cool_at_s, now_s + self._rest_s(chosen))
+        return chosen
+
+    def _rest_s(self, server: Server) -> float:
+        """Return how long a server that is away is not asked again [s]."""
+        return min(self.policy.base_s * (server.failures - 1), self.policy.max_wait_s)
 
     def failed(self, server: Server, error: ModelError, sent_s: float) -> None:
         """Record that a request sent at `sent_s` failed.
@@ -230,18 +243,20 @@ class Servers:
         policy, now_s = self.policy, self.policy.clock.now()
         server.was_heard |= error.status is not None
         is_down = error.sent in ("no", "lost") or error.status in _GATEWAY
-        if is_down and sent_s >= server.cool_at_s:
-            # Others that were sent before it began to cool down show nothing new.
+        if is_down and (sent_s >= server.cool_at_s or sent_s > server.failed_at_s):
+            # Others that were sent before it failed last show nothing new.
+            server.failed_at_s = now_s
             server.failing_since_s = server.failing_since_s if server.failures else now_s
             server.failures += 1
         elif not is_down and error.sent == "answered":
             server.failures = 0
         if is_down or error.status in _TOO_MUCH:
-            wait_s = policy.base_s * (server.failures - 1 if is_down else 1)
-            until_s = now_s + max(min(wait_s, policy.max_wait_s), policy.followed_s(error))
+            wait_s = self._rest_s(server) if is_down else policy.base_s
+            until_s = now_s + max(wait_s, policy.followed_s(error))
             server.cool_at_s = max(server.cool_at_s, until_s)
         lasted_s = now_s - server.failing_since_s
-        is_over = lasted_s >= policy.retry_for_s or not server.was_heard
+        patience_s = policy.retry_for_s if server.was_heard else _STARTING_S
+        is_over = lasted_s >= min(patience_s, policy.retry_for_s)
         if is_over and server.failures >= MOST_CONNECTION_FAILURES:
             why = f"{server.name} could not be reached for {lasted_s:.0f} s: {error}"
             error = UnavailableError(why, sent="no")
@@ -394,6 +409,8 @@ class ChatModel:
             raise
         finally:
             server.under_way -= 1
+        if server.failures > 1:
+            server.cool_at_s = float("-inf")
         server.was_heard, server.failures = True, 0
         return reply
 

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
-from itertools import takewhile
+from itertools import takewhile, tee
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +30,7 @@ from phyblock.workers import Workers
 
 _CHANGED = "is not the data set that the run was made on, or it was changed since"
 _MOVED = "name the folder where it is now with --data"
+_STALE = "remove the folder of shards beside the run, and score again"
 _Judged = tuple[Record, Record]
 """A stored record, and its new judgement."""
 _NO_DATA = ("prompt", "pictures", CARRYING, ENGINE)
@@ -56,19 +57,26 @@ def rescore(
     judge = _Judge(folder, manifest, suite, recorded_dataset(folder, manifest, data), strict=False)
     versions = {**manifest.versions, **code_versions()}
     diverged: Counter[str] = Counter()
+    writes = workers is None or workers.shards is None or workers.shards.writes
 
     def records() -> Iterator[Record]:
         share = map if workers is None else workers.map
         work: Callable[[tuple[str, Record]], _Judged] = judge
         if workers is not None and not workers.is_here:
             work = partial(_judge_there, folder.resolve(), None if data is None else data.resolve())
-        lines = run_records(folder, manifest, whole=True)
+        lines, stored = tee(run_records(folder, manifest, whole=True))
         for record, again in watch(share(work, lines)):
+            where, now = next(stored, (str(folder), None))
+            # Answers of an earlier job about this run may be kept in its folder of shards.
+            if record != now and writes:
+                raise StoreError(Problem(where, "was scored as it was before", hint=_STALE))
             diverged[record.track] += again.error is not None and record.error is None
             yield again
+        if writes and next(stored, None) is not None:
+            raise StoreError(Problem(str(folder), "has new records", hint=_STALE))
 
     with contextlib.closing(judge):
-        if workers is not None and workers.shards is not None and not workers.shards.writes:
+        if not writes:
             for _ in records():
                 pass
             return

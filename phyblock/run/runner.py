@@ -39,7 +39,7 @@ from phyblock.records.files import BATCHES
 from phyblock.records.record import Record, Reply
 from phyblock.run.judge import about_prompt, begun, judge_episode, judge_reply
 from phyblock.run.plan import RunPlan, Sample
-from phyblock.run.store import RunStore
+from phyblock.run.store import RunStore, Summary
 from phyblock.text import counted
 from phyblock.tracks.base import Item
 
@@ -49,10 +49,10 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RunStarted:
-    """Number of samples of a model, and by model the final records already on disk."""
+    """Number of samples of a model, and by model the summary of final records on disk."""
 
     expected: int
-    earlier: Mapping[str, Sequence[Record]]
+    earlier: Mapping[str, Sequence[Summary]]
 
 
 @dataclass(frozen=True)
@@ -124,7 +124,7 @@ class RunResult:
         """Number of samples without a final record."""
         return self.samples - self.settled
 
-    def add(self, sample: Record) -> None:
+    def add(self, sample: Record | Summary) -> None:
         """Count a sample by its record."""
         self.settled += sample.is_final
         self.failed += sample.is_final and not sample.is_answered
@@ -194,7 +194,7 @@ class Session:
         ids = frozenset(sample.id for each in samples.values() for sample in each)
         self._store = store = stack.enter_context(RunStore(self.folder, plan.manifest, ids))
         queues: dict[str, deque[Sample]] = {name: deque() for name in samples}
-        earlier: dict[str, list[Record]] = {name: [] for name in samples}
+        earlier: dict[str, list[Summary]] = {name: [] for name in samples}
         for name, queue in queues.items():
             for sample in samples[name]:
                 known = store.progress.samples.get(sample.id)

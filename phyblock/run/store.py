@@ -53,10 +53,12 @@ from phyblock.records.record import (
     Stopped,
 )
 from phyblock.run.manifest import code_versions, differences
+from phyblock.scoring.plan import Counts
 from phyblock.text import counted, hex_digest, well_formed
 
 LineT = TypeVar("LineT", bound=Line)
 
+_HEADLINE = "aov"
 _OTHER_FOLDER = "choose another folder with --out"
 _APPENDING = "free some space and run the same command again to continue"
 
@@ -154,16 +156,50 @@ class AppendFile:
             raise StoreError(Problem(str(self._path), message, hint=hint))
 
 
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """The part of a record that live progress needs; `counts` are of the headline matcher and
+    setting.
+
+    `paid_usd` is None if a price is unknown, `cached` None without a reply.
+    """
+
+    model: str
+    outcome: str
+    is_answered: bool
+    is_final: bool
+    is_judged: bool
+    counts: Counts | None
+    cached: bool | None
+    paid_usd: float | None
+
+    @classmethod
+    def of(cls, record: Record) -> Summary:
+        """Return the summary of a record."""
+        headline = next((s for s in record.scores if s.criterion == _HEADLINE), None)
+        reply = record.reply
+        return cls(
+            record.model,
+            record.outcome,
+            record.is_answered,
+            record.is_final,
+            record.is_judged,
+            None if headline is None else Counts(headline.tp, headline.fp, headline.fn),
+            None if reply is None else reply.cached,
+            record.paid_usd,
+        )
+
+
 @dataclass
 class Progress:
-    """The newest record of every sample, and the cost of the run so far.
+    """The summary of the newest record of every sample, and the cost of the run so far.
 
     `batches` are all lines about batches, oldest first; `calls` is the number of calls made,
     `replies` are those without a final record, by key, and `unanswered` the calls without a known
     end, by number: each may have been billed.
     """
 
-    samples: dict[str, Record] = field(default_factory=dict)
+    samples: dict[str, Summary] = field(default_factory=dict)
     batches: list[BatchLine] = field(default_factory=list)
     calls: int = 0
     replies: dict[str, Reply] = field(default_factory=dict)
@@ -173,7 +209,7 @@ class Progress:
 
     def add(self, record: Record) -> None:
         """Add a record; records come oldest first."""
-        self.samples[record.sample] = record
+        self.samples[record.sample] = Summary.of(record)
         self._records_usd[record.sample] += record.limit_usd
 
     def add_call(self, call: Call) -> None:

@@ -86,9 +86,9 @@ def write_report(written: TablesWritten, data: Path | None = None) -> Path:
     return write_page(out, REPORT_FILE, _FOLDER, build, make, lasting=[PICTURES])
 
 
-def files_of() -> tuple[str, ...]:
-    """Return the files that a run folder may get: tables and page."""
-    return (*table_files(), *_PAGE)
+def files_of(*, page: bool) -> tuple[str, ...]:
+    """Return the files that a run folder may get: tables, and the page if it is wanted."""
+    return (*table_files(), *(_PAGE if page else ()))
 
 
 def report_files(folder: Path) -> dict[str, Path]:

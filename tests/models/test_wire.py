@@ -9,6 +9,8 @@ import socket
 from dataclasses import replace
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from phyblock.config.models import ModelConfig
 from phyblock.config.suite import Suite
@@ -24,7 +26,7 @@ from phyblock.errors import (
 from phyblock.models import client
 from phyblock.models.client import shown
 from phyblock.models.model import RetryPolicy
-from phyblock.models.request import Image, wire_messages
+from phyblock.models.request import Image, Message, json_body, wire_messages
 from phyblock.parsing.answer import choice_form
 from phyblock.parsing.move import move_form
 from phyblock.parsing.plan import plan_form
@@ -170,6 +172,30 @@ def test_how_closely_to_look_arrives_in_the_words_of_the_provider(
     request = replace(make_request(), params={})
     seen = wire.arrived(route, request, id=model_id, image_detail=detail)
     assert looked_at(seen) == [arrives, arrives]
+
+
+texts = st.text(max_size=30)
+images = st.builds(
+    lambda magic, tail: Image(magic + tail, "goal", 8, 8),
+    st.sampled_from([PNG, JPEG, b"GIF89a", b"RIFF0000WEBP"]),
+    st.binary(max_size=40),
+)
+messages = st.builds(
+    Message,
+    st.sampled_from(["system", "user", "assistant"]),
+    st.lists(texts | images, min_size=1, max_size=5).map(tuple),
+)
+
+
+@settings(max_examples=200)
+@given(
+    st.lists(messages, max_size=4).map(tuple),
+    st.dictionaries(texts, texts, max_size=3),
+    st.sampled_from([None, "low", "high"]),
+)
+def test_a_body_made_around_the_encoder_says_what_the_encoder_would(content, fields, detail):
+    expected = {**fields, "messages": wire_messages(content, detail)}
+    assert json.loads(json_body(fields, content, detail)) == expected
 
 
 def test_only_pictures_are_sent_as_pictures():
