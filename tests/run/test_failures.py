@@ -100,10 +100,12 @@ def test_a_model_that_cannot_answer_is_stopped_alone(workspace):
 
 
 def test_a_server_that_is_gone_stops_its_model_and_leaves_the_samples(inside, monkeypatch, capsys):
-    """With waits a hundred times shorter."""
+    """With waits a hundred times shorter, and patience too."""
     monkeypatch.setattr(runner, "RetryPolicy", partial(RetryPolicy, base_s=0.005))
     inside.write_models("http://127.0.0.1:9", "alpha")
-    inside.write_suite(models=["alpha", "random"], seeds=list(range(20)))
+    inside.write_suite(
+        models=["alpha", "random"], seeds=list(range(20)), limits={"retry_for_s": 3.0}
+    )
     assert call("run", "suite.yaml", "--out", inside.out) == 1
     out, err = capsys.readouterr()
     assert err == ""
