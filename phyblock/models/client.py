@@ -8,6 +8,7 @@ is sent twice. aiohttp is imported by the first call.
 from __future__ import annotations
 
 import base64
+import email.utils
 import functools
 import html
 import json
@@ -512,11 +513,12 @@ def _words(body: bytes) -> tuple[str, tuple[str, ...]]:
 
 
 def retry_after_s(headers: Mapping[str, str]) -> float | None:
-    """Return the seconds of a `Retry-After` header; None if there is none, or it is a date."""
+    """Return the seconds of a `Retry-After` header, which may be an HTTP date; None without one."""
     value = next((v for k, v in headers.items() if k.lower() == "retry-after"), "")
     try:
-        asked_s = float(value)
-    except ValueError:
+        date = email.utils.parsedate_tz(value)
+        asked_s = email.utils.mktime_tz(date) - time.time() if date else float(value)
+    except (ValueError, OverflowError):
         return None
     return max(0.0, asked_s) if math.isfinite(asked_s) else None
 

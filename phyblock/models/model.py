@@ -175,8 +175,9 @@ _TOO_MUCH = (429, 529)
 
 @dataclass(eq=False)
 class Server:
-    """One server, which failed `failures` times in a row since `failing_since_s` and is not asked
-    before `cool_at_s`; `refusal` is the reason why it is not used any more.
+    """One server, which failed `failures` times in a row, first at `failing_since_s` and last at
+    `failed_at_s`, and is not asked before `cool_at_s`; `refusal` is the reason why it is not used
+    any more.
     """
 
     name: str
@@ -219,7 +220,7 @@ class Servers:
     def pick(self, failed: Server | None = None) -> Server:
         """Return the server to ask. One that just `failed` the request is the last choice.
 
-        A server that is away gets one request at a time until it answers.
+        A server that is away gets single requests at growing distances until it answers.
         """
         now_s = self.policy.clock.now()
         chosen = min(

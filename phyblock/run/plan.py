@@ -304,6 +304,7 @@ def check_models(models: Iterable[ModelConfig], source: YamlSource | None = None
 
 
 def _providers(config: ModelConfig) -> frozenset[str]:
+    """Return the known providers. litellm, slow to import, is imported for the models it asks."""
     from phyblock.models.litellm_client import known_providers
 
     return known_providers(config)
@@ -324,11 +325,8 @@ def find_suite(name: str) -> Path:
         return path
     if name.removesuffix(".yaml") in suites:
         return bundled("benchmarks", f"{path.stem}.yaml")
-    allowed, hint = (
-        f"a suite file, or a bundled suite: {', '.join(suites)}",
-        did_you_mean(path.stem, suites),
-    )
-    message = "there is no such suite file"
+    message, hint = "there is no such suite file", did_you_mean(path.stem, suites)
+    allowed = f"a suite file, or a bundled suite: {', '.join(suites)}"
     raise SpecError(Problem(name or "suite", message, allowed=allowed, hint=hint))
 
 

@@ -69,7 +69,7 @@ def rescore(
             where, now = next(stored, (str(folder), None))
             # Answers of an earlier job about this run may be kept in its folder of shards.
             if record != now and writes:
-                raise StoreError(Problem(where, "was scored as it was before", hint=_STALE))
+                raise StoreError(Problem(where, "is not the record that was scored", hint=_STALE))
             diverged[record.track] += again.error is not None and record.error is None
             yield again
         if writes and next(stored, None) is not None:

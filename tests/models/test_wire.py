@@ -6,7 +6,9 @@ import asyncio
 import contextlib
 import json
 import socket
+import time
 from dataclasses import replace
+from datetime import UTC, datetime
 
 import pytest
 from hypothesis import given, settings
@@ -316,10 +318,13 @@ def test_a_call_ends_as_the_server_ends_it(wire, route, mode):
 @pytest.mark.parametrize(
     ("wish", "seconds"), [("7", 7), ("Wed, 21 Oct 2099 07:28:00 GMT", None), ("nan", None)]
 )
-def test_retry_after_is_read_as_seconds(wire, route, wish, seconds):
+def test_retry_after_is_read_as_seconds_and_as_a_date(wire, route, wish, seconds):
     faults = Faults(mode="429", retry_after=wish)
     (answer,), _, _ = wire.ask(route, *seeded(1), faults=faults, policy=ONCE)
     assert isinstance(answer, RetryableError)
+    if "GMT" in wish:
+        until_s = datetime(2099, 10, 21, 7, 28, tzinfo=UTC).timestamp()
+        seconds = pytest.approx(until_s - time.time(), abs=60)
     assert answer.retry_after_s == seconds
 
 

@@ -153,3 +153,15 @@ def test_a_kill_before_either_file_is_replaced_processes_and_shards_end_in_the_s
     for shard in ("2/3", "1/3", "3/3"):
         assert call("score", "shards", "--shard", shard) == 0
     assert records("processes") == records("shards") == records("whole")
+
+
+@pytest.mark.usefixtures("begun")
+def test_answers_of_a_shard_about_earlier_records_are_refused(workspace):
+    assert call("score", "out", "--shard", "1/1") == 0
+    assert run("out") == 0
+    before = newest(workspace, "out")
+    with pytest.raises(StoreError, match="is not the record that was scored"):
+        call("score", "out", "--shard", "1/1")
+    assert newest(workspace, "out") == before
+    assert call("score", "out") == 0
+    assert newest(workspace, "out") == before
