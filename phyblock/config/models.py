@@ -212,6 +212,9 @@ class ModelConfig(Section):
     """Maximum number of concurrent calls to this model. If missing: the suite's."""
     rpm: Count | None = None
     """Maximum requests per minute, which start evenly."""
+    tpm: Count | None = None
+    """Maximum tokens per minute, of prompts and replies. A reply counts with its longest possible
+    length until it has arrived; a request larger than the limit is sent, and the next one waits."""
     temperature: Temperature | None = None
     """0 to 2. If missing: the suite's; null: not sent."""
     top_p: TopP | None = None

@@ -282,6 +282,11 @@ class Estimate:
     completion_tokens: int
     most_completion_tokens: int
 
+    @property
+    def most_tokens(self) -> int:
+        """The tokens of the prompt and of the longest possible reply."""
+        return self.prompt_tokens + self.most_completion_tokens
+
 
 def estimate(config: ModelConfig, request: Request) -> Estimate:
     """Return an estimate of the tokens of a request."""

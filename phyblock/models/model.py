@@ -49,8 +49,10 @@ class Clock:
 
 
 class Limits:
-    """The limits of one model: requests in progress, and requests a minute, which start evenly.
+    """The limits of one model: requests in progress, and requests and tokens a minute.
 
+    Both a minute are kept in the same way: a request that starts delays the next one by its share
+    of a minute. So starts are even, and a request larger than a whole minute's tokens is sent too.
     `overall` is shared by all models of a run; `cooling_s` returns how long no server of the model
     may be asked, as after a 429.
     """
@@ -60,36 +62,47 @@ class Limits:
         most: int,
         overall: asyncio.Semaphore,
         rpm: int | None = None,
+        tpm: int | None = None,
         *,
         cooling_s: Callable[[], float] = lambda: 0.0,
         clock: Clock | None = None,
     ) -> None:
         self._under_way = asyncio.Semaphore(most)
         self._overall = overall
-        self._apart_s = 60.0 / rpm if rpm else 0.0
-        self._next_s = float("-inf")
+        self._request_s = 60.0 / rpm if rpm else 0.0
+        self._token_s = 60.0 / tpm if tpm else 0.0
+        self._next_by_requests_s = self._next_by_tokens_s = float("-inf")
         self._cooling_s = cooling_s
         self._clock = clock or Clock()
         self._admission = asyncio.Lock()
 
     @contextlib.asynccontextmanager
-    async def slot(self) -> AsyncIterator[None]:
-        """Hold a place of the model and of the whole run.
+    async def slot(self, tokens: int = 0) -> AsyncIterator[None]:
+        """Hold a place of the model and of the whole run; `tokens` are the most it can take.
 
         Requests are admitted one after another; a model that waits for its turn holds no place that
         another model could use.
         """
         async with self._under_way:
             async with self._admission:
-                while (wait_s := max(self._cooling_s(), self._next_s - self._clock.now())) > 0:
-                    # In short waits, since the last server may be given up meanwhile.
+                while (wait_s := max(self._cooling_s(), self._next_s() - self._clock.now())) > 0:
+                    # In short waits, since tokens may be released or the last server given up.
                     await self._clock.sleep(min(wait_s, 1.0))
                 await self._overall.acquire()
-                self._next_s = self._clock.now() + self._apart_s
+                now_s = self._clock.now()
+                self._next_by_requests_s = now_s + self._request_s
+                self._next_by_tokens_s = now_s + self._token_s * tokens
             try:
                 yield
             finally:
                 self._overall.release()
+
+    def release(self, tokens: int) -> None:
+        """Give back tokens that a request turned out not to take."""
+        self._next_by_tokens_s -= self._token_s * tokens
+
+    def _next_s(self) -> float:
+        return max(self._next_by_requests_s, self._next_by_tokens_s)
 
 
 @dataclass(frozen=True)
@@ -341,7 +354,7 @@ class ChatModel:
     async def _attempt(self, call: _Call) -> Reply:
         """Send once, when limits and budget have room."""
         held = None
-        async with self.limits.slot():
+        async with self.limits.slot(call.expected.most_tokens):
             if self.budget.tariff is not None:
                 held = await self.budget.reserve(lambda: self.budget.most_usd(call.expected) or 0.0)
             exchange = asyncio.ensure_future(self._exchange(call, held))
@@ -375,9 +388,14 @@ class ChatModel:
             spent_usd = cost_usd(self.budget.tariff, reply)
             reply = reply.model_copy(update={"cost_usd": spent_usd, "attempts": call.sent})
             self.budget.learn(call.expected, reply.usage)
+            prompt, completion = reply.usage.prompt_tokens, reply.usage.completion_tokens
+            if prompt is not None and completion is not None:
+                self.limits.release(call.expected.most_tokens - prompt - completion)
         except ModelError as error:
             is_free = isinstance(error, UnavailableError) or not may_be_billed(error)
             spent_usd = 0.0 if is_free else None
+            if is_free:
+                self.limits.release(call.expected.most_tokens)
             self.servers.usable()
             if isinstance(error, UnavailableError):
                 # The server that refuses every request is left out, and another one is asked.
@@ -482,6 +500,7 @@ def build_model(
         config.max_concurrency,
         overall or asyncio.Semaphore(config.max_concurrency),
         config.rpm,
+        config.tpm,
         cooling_s=servers.cooling_s,
         clock=policy.clock,
     )

@@ -76,7 +76,7 @@ def test_keys_are_equal_when_all_that_decides_is_equal(config, request, other_co
     "fields",
     [
         {"name": "other"},
-        {"transport": "litellm", "max_concurrency": 1, "rpm": 5},
+        {"transport": "litellm", "max_concurrency": 1, "rpm": 5, "tpm": 5},
         {"price": {"input": 1, "output": 2}, "timeout_s": 1.0, "api_key_env": "KEY"},
         {"api_base": "http://node17:2/v1"},
         {"temperature": 0.5},

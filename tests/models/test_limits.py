@@ -59,32 +59,63 @@ class FakeTime:
             task.result()
 
 
-calls = st.lists(st.tuples(st.floats(0, 200), st.floats(0, 90)), max_size=40)
+calls = st.lists(
+    st.tuples(st.floats(0, 200), st.floats(0, 90), st.integers(0, 300), st.integers(0, 300)),
+    max_size=40,
+)
 
 
-@given(calls, st.integers(1, 10), st.integers(1, 8))
+@given(calls, st.integers(1, 10), st.integers(20, 500), st.integers(1, 8))
 @in_a_loop
-async def test_no_window_of_a_minute_has_more_starts_than_allowed(arrivals, rpm, width):
-    starts = []
+async def test_requests_and_tokens_of_a_minute_keep_to_their_limits(arrivals, rpm, tpm, width):
+    """A request waits until those before it have had their time: 60 s / rpm each, and for every
+    token that it took, or may still take, 60 s / tpm. All are sent, the largest as well.
+    """
+    starts, ends = [], []
     inside = 0
     time = FakeTime()
-    limits = Limits(width, asyncio.Semaphore(width), rpm, clock=time.clock)
+    limits = Limits(width, asyncio.Semaphore(width), rpm, tpm, clock=time.clock)
 
-    async def call(at_s, takes_s):
+    async def call(at_s, takes_s, most, unused):
         nonlocal inside
         await time.sleep(at_s)
-        async with limits.slot():
-            starts.append(time.now_s)
+        async with limits.slot(most):
+            starts.append((time.now_s, most))
             inside += 1
             assert inside <= width
             await time.sleep(takes_s)
             inside -= 1
+            limits.release(min(most, unused))
+            ends.append((time.now_s, min(most, unused)))
 
     await time.run_until_done(*(asyncio.create_task(call(*one)) for one in arrivals))
     assert len(starts) == len(arrivals)
-    # In any half-open window of a minute, but for rounding.
-    windows = [[t for t in starts if start <= t < start + 60 - 1e-6] for start in starts]
-    assert max(map(len, windows), default=0) <= rpm
+    for first, (from_s, _) in enumerate(starts):
+        for last, (to_s, _) in enumerate(starts[first:], first):
+            lasted_s = to_s - from_s + 1e-6  # but for rounding
+            assert (last - first) * 60 <= lasted_s * rpm
+            unused = sum(tokens for end_s, tokens in ends if from_s <= end_s <= to_s)
+            taken = sum(tokens for _, tokens in starts[first:last]) - unused
+            assert taken * 60 <= lasted_s * tpm
+
+
+def test_tokens_count_as_reserved_until_a_reply_reports_them():
+    waits = []
+
+    async def sleep(seconds):
+        waits.append(seconds)
+
+    async def main(url):
+        config = ROUTES["direct"].config(url, tpm=6_000)
+        clock = Clock(lambda: sum(waits), sleep)
+        model = make_model(config, policy=RetryPolicy(clock=clock))
+        used = [(await model.ask(make_request(key))).usage for key in ("000", "001", "002")][:2]
+        await model.aclose()
+        return sum(usage.prompt_tokens + usage.completion_tokens for usage in used)
+
+    with Running(ROUTES["direct"].server()) as running:
+        taken = asyncio.run(main(running.url))
+    assert sum(waits) == pytest.approx(taken * 60 / 6_000)
 
 
 @in_a_loop
@@ -262,15 +293,15 @@ def test_a_request_under_way_is_answered_and_a_second_cancellation_gives_it_up(
     assert budget.holds == 0
 
 
-@pytest.mark.parametrize("where", ["slot", "minute", "budget", "retry", "rest"])
+@pytest.mark.parametrize("where", ["slot", "minute", "tokens", "budget", "retry", "rest"])
 def test_whatever_is_waited_for_a_cancellation_ends_the_wait_and_nothing_is_sent(where):
     mode = {"retry": "429", "rest": "429"}.get(where, "slow")
     server = ROUTES["direct"].server(Faults(mode=mode, retry_after="100"))
-    fields = {"slot": {"max_concurrency": 1}, "minute": {"rpm": 1}}.get(where, {})
+    limits = {"slot": {"max_concurrency": 1}, "minute": {"rpm": 1}, "tokens": {"tpm": 1}}
 
     async def main(url):
         price = {"input": 0, "output": 1e6}
-        config = ROUTES["direct"].config(url, price=price, seed="never", **fields)
+        config = ROUTES["direct"].config(url, price=price, seed="never", **limits.get(where, {}))
         budget = Budget(200.0) if where == "budget" else None
         model = make_model(config, budget=budget, policy=RetryPolicy())
         asked = [asyncio.create_task(model.ask(make_request("000")))]
