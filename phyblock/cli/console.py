@@ -19,7 +19,6 @@ from rich.progress import track
 from rich.table import Table
 from rich.text import Text
 
-from phyblock.errors import Problem, SpecError
 from phyblock.results.text import Column, TextTable
 from phyblock.text import one_line, plain_lines
 from phyblock.types import QUOTE_HINT
@@ -29,8 +28,6 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-LINE_EVERY_S = 10.0
-"""Interval of progress lines where no bar is shown [s]."""
 INTERRUPTED = 130
 """The exit code after Ctrl-C."""
 _PIPE_WIDTH = 160
@@ -135,27 +132,6 @@ def print_again(console: Console, how: str = "run") -> None:
     """Print that the same command continues, and the command."""
     console.print(f"To continue, {how} the same command again:")
     print_path(console, f"  {shlex.join(['phyblock', *sys.argv[1:]])}")
-
-
-def may_spend(
-    models: Sequence[str], show: Callable[[], None], *, has_limit: bool | None = None
-) -> bool:
-    """True if the user agrees that calls to these models may cost money; used by all commands.
-
-    `show` prints the estimate. Without a terminal, a cost limit counts as agreement (None: the
-    command has no limit); raises SpecError if there is none.
-    """
-    is_asked = sys.stdin is not None and sys.stdin.isatty()
-    if not models or (has_limit and not is_asked):
-        return True
-    show()
-    if is_asked:
-        return click.confirm("Continue?", default=False)
-    message = "would cost money, and there is no terminal to ask on"
-    hint = "agree with --yes"
-    if has_limit is not None:
-        hint += ", or set a limit: --set limits.max_cost_usd=5"
-    raise SpecError(Problem("models", message, found=", ".join(models), hint=hint))
 
 
 class UserPath(click.Path):

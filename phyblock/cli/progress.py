@@ -20,7 +20,6 @@ from rich.progress import (
 )
 from rich.text import Text
 
-from phyblock.cli.console import LINE_EVERY_S
 from phyblock.models.model import ModelEvent
 from phyblock.run.runner import (
     ModelStopped,
@@ -35,6 +34,8 @@ from phyblock.scoring.plan import Counts
 from phyblock.text import counted, one_line
 from phyblock.types import FAILURES
 
+_LINE_EVERY_S = 10.0
+"""Interval of progress lines where no bar is shown [s]."""
 _SHOWN_EVERY_S = 0.1
 """Minimum time between two updates of the display [s]."""
 
@@ -151,7 +152,7 @@ class ProgressView:
         preparing = "" if self._has_asked else self._preparing(now_s)
         for tally in self._tallies.values():
             self._progress.update(tally.task.id, facts=preparing or tally.facts)
-        if not self._is_terminal and now_s - self._last_line_s >= LINE_EVERY_S:
+        if not self._is_terminal and now_s - self._last_line_s >= _LINE_EVERY_S:
             self._last_line_s = now_s
             self._print(self._line(now_s))
 

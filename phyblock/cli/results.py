@@ -24,7 +24,7 @@ from phyblock.cli.console import (
     shown_path,
 )
 from phyblock.errors import DataError, Problem, SpecError, StoreError
-from phyblock.results.text import REPORT_FILE, TABLES, Summary
+from phyblock.results.text import REPORT_FILE, TABLES
 from phyblock.text import counted, one_line, some_of
 
 if TYPE_CHECKING:
@@ -86,22 +86,18 @@ def show_tables(folder: Path, data: Path | None = None, *, page: bool = True) ->
     from phyblock.results.tables import summary_of, write_tables
 
     written = write_tables(folder)
-    _print_summary(summary_of(written.run))
-    if page:
-        from phyblock.web.report import write_report
-
-        write_report(written, data)
-    return folder / (REPORT_FILE if page else TABLES)
-
-
-def _print_summary(summary: Summary) -> None:
-    console = make_console()
+    console, summary = make_console(), summary_of(written.run)
     for table in summary.tables:
         print_table(console, table)
     for model, message, times in summary.failures[:_FAILURES]:
         console.print(one_line(f"{times:,} x {model}: {message}"), style="yellow")
     for sentence in summary.blind:
         console.print(sentence)
+    if page:
+        from phyblock.web.report import write_report
+
+        write_report(written, data)
+    return folder / (REPORT_FILE if page else TABLES)
 
 
 @click.command()

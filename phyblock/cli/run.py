@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import gc
 import signal
+import sys
 from collections.abc import Callable, Sequence
 from functools import partial
 from importlib import import_module
@@ -24,7 +25,6 @@ from phyblock.cli.console import (
     left_to_first,
     limit_option,
     make_console,
-    may_spend,
     models_file_option,
     models_option,
     open_shards,
@@ -42,6 +42,7 @@ from phyblock.cli.console import (
 from phyblock.cli.progress import ProgressView
 from phyblock.cli.results import show_tables
 from phyblock.config.models import load_models
+from phyblock.errors import Problem, SpecError
 from phyblock.files import OutFolder
 from phyblock.records.files import RECORDS, read_manifest
 from phyblock.results.text import NO_VALUE, REPORT_FILE, TABLES, Column, TextTable
@@ -122,14 +123,18 @@ def run(
         print_estimate(console, plan, estimate(plan, folder, **asks))
         return 0
     check_models(plan.models)
-    rows = [] if yes else may_bill(plan, folder, **asks)
-    if not may_spend(
-        [row.model.name for row in rows if row.may_cost],
-        lambda: print_estimate(console, plan, rows),
-        has_limit=plan.suite.limits.max_cost_usd is not None,
-    ):
-        console.print("Nothing was asked.")
-        return 1
+    has_limit = plan.suite.limits.max_cost_usd is not None
+    is_asked = sys.stdin is not None and sys.stdin.isatty()
+    if rows := [] if yes or (has_limit and not is_asked) else may_bill(plan, folder, **asks):
+        print_estimate(console, plan, rows)
+        if not is_asked:
+            found = ", ".join(row.model.name for row in rows if row.may_cost)
+            message = "would cost money, and there is no terminal to ask on"
+            hint = "agree with --yes, or set a limit: --set limits.max_cost_usd=5"
+            raise SpecError(Problem("models", message, found=found, hint=hint))
+        if not click.confirm("Continue?", default=False):
+            console.print("Nothing was asked.")
+            return 1
     if any(model.kind == "litellm" for model in plan.models):
         from phyblock.models.litellm_client import be_quiet
 

@@ -17,18 +17,13 @@ from phyblock.cli.console import (
     sets_option,
     shown_path,
 )
-from phyblock.config.models import (
-    RECORDED,
-    ModelConfig,
-    load_models,
-    with_members,
-)
+from phyblock.config.models import RECORDED, ModelConfig, load_models, with_members
 from phyblock.config.suite import Suite, suite_model
 from phyblock.config.yaml import read_yaml
 from phyblock.data.lookup import read_data_set
 from phyblock.data.scenes import SCENES_FILE
 from phyblock.errors import InputError, Problem, SpecError
-from phyblock.files import bundled, check_free, writing
+from phyblock.files import bundled, check_free, reply_cache_file, writing
 from phyblock.registry import baseline_names
 from phyblock.run.plan import (
     bundled_suites,
@@ -39,7 +34,7 @@ from phyblock.run.plan import (
     read_suite,
     to_config,
 )
-from phyblock.text import counted
+from phyblock.text import counted, did_you_mean
 from phyblock.tracks.base import kind_of
 
 _FILES = (
@@ -167,3 +162,26 @@ def models(models_file: str | None) -> None:
         rows.append((name, groups, config.id, key, price))
     print_rows(console, ("model", "groups", "id", "key", "$/M in, out"), rows, numbers=1)
     console.print(f"{counted(len(known), 'model')} in {shown_path(path)}")
+
+
+@click.command()
+@click.option("--clear", metavar="ID", help="Ask, then delete the replies of this model id.")
+def cache(clear: str | None) -> None:
+    """List the replies in the reply cache, which all runs of this user share, by model id."""
+    from phyblock.models.cache import ReplyCache
+
+    console, path = make_console(), reply_cache_file()
+    with ReplyCache(path) as opened:
+        counts = opened.counts()
+        if clear is not None:
+            if clear not in counts:
+                hint = did_you_mean(clear, counts)
+                raise SpecError(Problem(str(path), "has no replies of", "", clear, hint=hint))
+            which = f"{counted(counts.pop(clear), 'reply', 'replies')} of {clear}"
+            click.confirm(f"Delete {which}? The same calls are billed again.", abort=True)
+            opened.clear(clear)
+    rows = [(model, f"{number:,}") for model, number in counts.items()]
+    print_rows(console, ("model", "replies"), rows, numbers=1)
+    total = counted(sum(counts.values()), "reply", "replies")
+    console.print(f"{total}, {path.stat().st_size / 1e6:,.1f} MB, in")
+    print_path(console, path)

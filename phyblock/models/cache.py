@@ -114,6 +114,19 @@ class ReplyCache:
         with self._using():
             self._db.execute("INSERT OR REPLACE INTO replies VALUES (?, ?, ?, ?)", row)
 
+    def counts(self) -> dict[str, int]:
+        """Return the number of replies by model id."""
+        sql = "SELECT model, count(*) FROM replies GROUP BY model ORDER BY model"
+        with self._using():
+            return dict(self._db.execute(sql).fetchall())
+        return {}
+
+    def clear(self, model_id: str) -> None:
+        """Delete the replies of a model id."""
+        with self._using():
+            self._db.execute("DELETE FROM replies WHERE model = ?", (model_id,))
+            self._db.execute("VACUUM")
+
     def shared(self, key: str) -> asyncio.Lock:
         """Return the lock under which one task of this process at a time sends a request."""
         return self._locks.setdefault(key, asyncio.Lock())

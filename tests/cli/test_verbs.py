@@ -14,8 +14,10 @@ from phyblock.config.models import ModelConfig
 from phyblock.data.scenes import read_builtin
 from phyblock.errors import SpecError, StoreError
 from phyblock.models import litellm_client
+from phyblock.models.cache import ReplyCache
 from phyblock.models.litellm_client import known_providers
 from phyblock.records.files import read_records
+from phyblock.records.record import Reply
 from phyblock.sim.engine import ENGINES
 from phyblock.tracks.step_planning import StepPlanning
 from tests.servers.chassis import Running
@@ -65,7 +67,7 @@ def test_help_and_version_import_nothing_heavy():
         assert f"\n  {verb} " in told
     assert "phyblock run quick" in told
     assert not imported & {*HEAVY, "numpy", "pydantic", "rich", "yaml"}
-    verbs = ("run", "report", "score", "validate", "models", "init")
+    verbs = ("run", "report", "score", "validate", "models", "cache", "init")
     told, imported = ran(COMMANDS, "--version", *(f"{verb} --help" for verb in verbs))
     assert told.startswith("phyblock, version ")
     for verb in verbs:
@@ -213,8 +215,9 @@ def folder(tmp_path):
     return write_run(tmp_path / "run", records, facts)
 
 
-def call(*words):
-    return CliRunner().invoke(phyblock, [str(word) for word in words], catch_exceptions=False)
+def call(*words, typed=""):
+    words = [str(word) for word in words]
+    return CliRunner().invoke(phyblock, words, typed, catch_exceptions=False)
 
 
 def test_tables_print_all_or_one_in_any_form(folder):
@@ -247,6 +250,26 @@ def test_compare_says_the_verdict(folder, tmp_path):
     assert "empty name" in call("compare", folder, "--models", "alpha,").output
     with pytest.raises(StoreError, match=r"holds no run\.yaml"):
         call("compare", folder, tmp_path)
+
+
+def test_the_cache_is_listed_and_the_replies_of_one_model_are_deleted(tmp_path, monkeypatch):
+    monkeypatch.setenv("PHYBLOCK_CACHE", str(tmp_path))
+    with ReplyCache(tmp_path / "replies.sqlite") as cache:
+        for key, model in enumerate(("openai/a", "openai/a", "openai/b")):
+            cache.put(str(key), model, Reply(text="Step1"))
+    listed = call("cache").output
+    assert re.findall(r"^(openai/.) +(\d+)", listed, re.MULTILINE) == [
+        ("openai/a", "2"),
+        ("openai/b", "1"),
+    ]
+    assert "3 replies, 0.0 MB, in" in listed
+    with pytest.raises(SpecError, match="did you mean openai/a"):
+        call("cache", "--clear", "opnai/a")
+    assert "Delete 2 replies of openai/a?" in call("cache", "--clear", "openai/a").output
+    assert call("cache").output == listed
+    left = call("cache", "--clear", "openai/a", typed="y\n").output
+    assert "1 reply, 0.0 MB, in" in left
+    assert "openai/a " not in left
 
 
 def test_figures_and_exports_name_what_they_wrote(folder):
