@@ -3,14 +3,14 @@ worlds of scenes in which the true F1 is known.
 """
 
 import functools
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Set
 from dataclasses import dataclass, replace
 
 import numpy as np
 from hypothesis import strategies as st
 
 from phyblock.domain.scene import Block, Candidate, CandidateSet, Plan, Scene
-from phyblock.scoring.plan import Counts, Floats, Goal, match_plan, ratio_of
+from phyblock.scoring.plan import Counts, Floats, Goal, match_plan
 from phyblock.scoring.statistics import Clusters
 from phyblock.types import Setting
 
@@ -122,20 +122,43 @@ def greedy_tp(case: Case, setting: Setting) -> int:
     return len(placed)
 
 
-def greatest_tp(case: Case, setting: Setting) -> int:
-    """The most true positives over every sequence of choices, skipping a step among them."""
+def error_of(case: Case, index: int, placed: Set[int], setting: Setting) -> str:
+    """The type of a wrong step by the four definitions, of which exactly one must hold."""
+    candidate = case.candidates[index]
+    of_kind = [block for block in case.scene.blocks if block.kind == candidate.kind]
+    free = [block for block in of_kind if block.order not in placed]
+    free_equal = [block for block in free if equal(block, candidate, setting)]
+    holds = {
+        "shape_not_in_gt": not of_kind,
+        "overflow": bool(of_kind) and not free,
+        "incorrect_orientation": bool(free) and not free_equal,
+        "dependency_not_met": bool(free_equal)
+        and not any(placed >= {*block.depend} for block in free_equal),
+    }
+    (name,) = (name for name, true in holds.items() if true)
+    return name
+
+
+def best_of_all(case: Case, setting: Setting) -> tuple[int, int, int, int]:
+    """The best sequence of choices, skipping a step among them: most true positives, then fewest
+    steps skipped though a block was ready, `overflow`, and `incorrect_orientation`.
+    """
 
     @functools.cache
-    def best(step: int, placed: frozenset[int]) -> int:
+    def best(step: int, placed: frozenset[int]) -> tuple[int, int, int, int]:
         if step == len(case.plan):
-            return 0
-        taken = [
-            1 + best(step + 1, placed | {block.order})
-            for block in choices(case, case.plan.steps[step], placed, setting)
-        ]
-        return max([best(step + 1, placed), *taken])
+            return 0, 0, 0, 0
+        index = case.plan.steps[step]
+        ready = choices(case, index, placed, setting)
+        error = None if ready else error_of(case, index, placed, setting)
+        missed, skipped, full, turned = best(step + 1, placed)
+        full, turned = full + (error == "overflow"), turned + (error == "incorrect_orientation")
+        after = [best(step + 1, placed | {block.order}) for block in ready]
+        taken = [(missed - 1, *others) for missed, *others in after]
+        return min([(missed, skipped + bool(ready), full, turned), *taken])
 
-    return best(0, frozenset())
+    missed, *others = best(0, frozenset())
+    return (-missed, *others)
 
 
 def renumbered(case: Case, data: st.DataObject) -> Case:
@@ -157,16 +180,6 @@ def plans_f1(
     goals = {scene.id: Goal(scene, sets[scene.id], setting) for scene in scenes}
     counts = (match_plan(goal, plans[name], "optimal").counts for name, goal in goals.items())
     return sum(counts, Counts()).f1 or 0.0
-
-
-def precision_of(sums: Floats) -> Floats:
-    """TP / (TP + FP) of counts (..., [tp, fp, fn])."""
-    return ratio_of(np.stack([sums[..., 0], sums[..., 0] + sums[..., 1]], axis=-1))
-
-
-def recall_of(sums: Floats) -> Floats:
-    """TP / (TP + FN) of counts (..., [tp, fp, fn])."""
-    return ratio_of(np.stack([sums[..., 0], sums[..., 0] + sums[..., 2]], axis=-1))
 
 
 @dataclass(frozen=True)
