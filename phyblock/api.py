@@ -51,9 +51,9 @@ from phyblock.records.record import Record, Reply
 from phyblock.registry import added_measures, known_track, known_tracks
 from phyblock.results.load import Run, load_run
 from phyblock.run.estimate import may_bill
-from phyblock.run.judge import begun, judge_episode, judge_reply
 from phyblock.run.plan import check_models, find_models_file, make_plan, read_suite
 from phyblock.run.runner import RunEvent, Session, Stopping, completed, remarks_on
+from phyblock.run.store import begun, judge_episode, judge_reply
 from phyblock.sim.pictures import PictureStyle, candidates_png, composite_png, goal_png, goal_style
 from phyblock.text import counted, did_you_mean, well_formed
 from phyblock.tracks.base import Track, open_tracks
@@ -292,8 +292,7 @@ class Task:
     def _begun(self, reply: str | None) -> dict[str, Any]:
         answer = None if reply is None else Reply(text=well_formed(reply))
         sample = f"{self.track.name}/reply/{self.key}/s{self.seed}"
-        fields = begun(sample, self.track.name, "reply", self.item, self.seed, answer)
-        return {**fields, **self.track.about(self.item)}
+        return begun(sample, self.track, "reply", self.item, self.seed, answer)
 
     def _scored(self, record: Record) -> Score:
         suite = self.track.suite

@@ -100,8 +100,8 @@ def estimate(
                 continue
             for outline in outlines if row.model.kind == "litellm" else ():
                 is_known = has_all_pictures(outline)
-                asked = replace(outline, seed=sample.seed, params=row.model.params)
-                key = reply_key(row.model, sample.as_sent(asked)) if is_known else ""
+                asked = replace(outline, seed=sample.sent_seed, params=row.model.params)
+                key = reply_key(row.model, asked) if is_known else ""
                 if cache is not None and is_known and cache.get(key) is not None:
                     row.cached += 1
                 elif key in waiting:

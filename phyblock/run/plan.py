@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -20,7 +19,6 @@ from phyblock.errors import Problem, SpecError
 from phyblock.files import bundled
 from phyblock.models.client import api_key_status, server_address
 from phyblock.models.model import takes_format
-from phyblock.models.request import Request
 from phyblock.records.files import MANIFEST, Manifest, read_manifest, suite_of
 from phyblock.registry import track_baselines
 from phyblock.run.manifest import make_manifest
@@ -39,9 +37,12 @@ _SEEDS = 2**31
 """Providers accept no larger seeds."""
 
 
-@dataclass(frozen=True)
+@dataclass(eq=False)
 class Sample:
-    """One item of a track, asked of one model with one seed; `track` is that of the variant."""
+    """One item of a track, asked of one model with one seed; `track` is that of the variant.
+
+    `id` is its name in the run; a repeat is sent with another seed, so that it is not cached.
+    """
 
     track: Track
     model: str
@@ -49,19 +50,14 @@ class Sample:
     seed: int
     variant: Variant = field(default_factory=Variant)
 
-    @functools.cached_property
-    def id(self) -> str:
-        """Its name inside the run."""
-        whole = f"{self.track.name}/{self.model}/{self.item.key}/s{self.seed}"
-        return f"{whole}/{self.variant.key}" if self.variant.key else whole
-
-    def as_sent(self, request: Request) -> Request:
-        """Return the request as sent: a repeat has another seed, so that it is not cached."""
-        seed = request.seed
-        if self.variant.levels and (repeat := self.variant.repeat) != 1:
-            digest = drawn_bytes("repeat", request.seed, repeat)
-            seed = int.from_bytes(digest[:8], "big") % _SEEDS
-        return replace(request, seed=seed, sample=self.id, track=self.track.name)
+    def __post_init__(self) -> None:
+        self.id = f"{self.track.name}/{self.model}/{self.item.key}/s{self.seed}"
+        self.sent_seed = self.seed
+        if self.variant.levels:
+            self.id += f"/{self.variant.key}"
+            if (repeat := self.variant.repeat) != 1:
+                digest = drawn_bytes("repeat", self.seed, repeat)
+                self.sent_seed = int.from_bytes(digest[:8], "big") % _SEEDS
 
 
 @dataclass(frozen=True)

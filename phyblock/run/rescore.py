@@ -21,9 +21,8 @@ from phyblock.data.lookup import open_dataset
 from phyblock.errors import DataError, Problem, StoreError
 from phyblock.records.files import MANIFEST, Manifest, read_manifest, run_records, suite_of
 from phyblock.records.record import AskedTurn, Record, StoredError
-from phyblock.run.judge import about_item, judge_reply, judged
 from phyblock.run.manifest import asked_counts, code_versions
-from phyblock.run.store import locked, write_run
+from phyblock.run.store import about_item, judge_reply, judged, locked, write_run
 from phyblock.text import counted
 from phyblock.tracks.base import CARRYING, ENGINE, Item, Track, kind_of, open_tracks, select_tasks
 from phyblock.workers import Workers
@@ -218,7 +217,7 @@ def _judge_there(
 
 
 async def _again(track: Track, item: Item, record: Record, where: str, *, strict: bool) -> Record:
-    given = {**record.as_given(), **about_item(item), **track.about(item)}
+    given = {**record.as_given(), **about_item(track, item)}
     if "engine" in record.model_fields_set:
         # Nothing is let go again: what fell stands in the record, and so does what let it fall.
         given["engine"] = record.as_given()["engine"]

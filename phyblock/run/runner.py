@@ -37,9 +37,8 @@ from phyblock.models.model import ModelEvent, RetryPolicy, build_model
 from phyblock.models.request import HaltedError, Model, Request
 from phyblock.records.files import BATCHES
 from phyblock.records.record import Record, Reply
-from phyblock.run.judge import about_prompt, begun, judge_episode, judge_reply
 from phyblock.run.plan import RunPlan, Sample
-from phyblock.run.store import RunStore, Summary
+from phyblock.run.store import RunStore, Summary, begun, judge_episode, judge_reply
 from phyblock.text import counted
 from phyblock.tracks.base import Item
 
@@ -360,8 +359,8 @@ class Session:
     async def _ask(self, sample: Sample, item: Item, config: ModelConfig) -> Record:
         track, model = sample.track, self._models[sample.model]
         shows = model.needs_messages
-        made = track.request(item, sample.seed, config.params, with_messages=shows)
-        request = sample.as_sent(await self._until_stopped(made))
+        made = track.request(item, sample.sent_seed, config.params, with_messages=shows)
+        request = replace(await self._until_stopped(made), sample=sample.id)
         answer = await self._answer(model, request)
         fields = self._fields(sample, item, answer, request, config)
         record, is_cancelled = await to_its_end(judge_reply(track, item, fields))
@@ -373,11 +372,12 @@ class Session:
 
     async def _play(self, sample: Sample, item: Item, config: ModelConfig) -> Record:
         track, model = sample.track, self._models[sample.model]
-        episode = track.start(item, sample.seed, config.params, with_messages=model.needs_messages)
+        shows = model.needs_messages
+        episode = track.start(item, sample.sent_seed, config.params, with_messages=shows)
         replies: list[Reply] = []
         fields = self._fields(sample, item, None, None, config)
         while (wanted := await self._until_stopped(episode.request())) is not None:
-            request = sample.as_sent(wanted)
+            request = replace(wanted, sample=sample.id)
             answer = await self._answer(model, request)
             fields = self._fields(sample, item, answer, request, config)
             if not isinstance(answer, Reply):
@@ -405,13 +405,12 @@ class Session:
     ) -> dict[str, Any]:
         """Return the fields of a record before it is judged."""
         track = sample.track
-        fields = begun(sample.id, track.name, sample.model, item, sample.seed, answer)
-        fields |= {"run": self._store.run, **track.about(item)}
+        fields = begun(sample.id, track, sample.model, item, sample.seed, answer)
+        fields["run"] = self._store.run
         if sample.variant.levels:
             fields["variant"] = dict(sample.variant.levels)
         if request is not None and request.messages:
-            digest = self._store.keep_prompt(request.messages)
-            fields["prompt"] = about_prompt(request, track.prompt_name, digest)
+            fields["prompt"] = self._store.keep_prompt(request, track.prompt_name)
         if request is not None and request.response_format and config.kind == "litellm":
             fields["asked"] = "response_format" if config.sends_format else "prompt"
         return fields

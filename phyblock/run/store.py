@@ -1,4 +1,4 @@
-"""Writing a run: `run.yaml`, written first, and the files that grow.
+"""The records of a run: judged, written, replaced; `run.yaml`, written first, and other files.
 
 A record counts only when it is appended and synced, so a kill at any moment loses nothing that was
 written; a line that a kill cut short is dropped when the run is opened again. A later record of a
@@ -18,14 +18,23 @@ from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from io import FileIO
 from pathlib import Path
 from typing import Any, TypeVar
 
 from phyblock.config.yaml import dump_yaml
-from phyblock.errors import Problem, StoreError
+from phyblock.errors import (
+    ModelError,
+    Problem,
+    RefusedError,
+    RetryableError,
+    SampleError,
+    SimulationError,
+    StoreError,
+)
 from phyblock.files import LIST, OutFolder, append_whole, atomic_write, sync_folder, writing
-from phyblock.models.request import Image, Message
+from phyblock.models.request import Image, Request
 from phyblock.records.files import (
     BATCHES,
     CALLS,
@@ -47,16 +56,24 @@ from phyblock.records.files import (
 from phyblock.records.record import (
     BatchLine,
     Call,
+    ErrorKind,
     Line,
     Record,
     Reply,
+    SentImage,
+    SentPrompt,
     Stopped,
+    StoredError,
+    Usage,
 )
 from phyblock.run.manifest import code_versions, differences
 from phyblock.scoring.plan import Counts
-from phyblock.text import counted, hex_digest, well_formed
+from phyblock.text import counted, hex_digest, plain_sum, well_formed
+from phyblock.tracks.base import Episode, Item, Judgement, Track
+from phyblock.types import Outcome
 
 LineT = TypeVar("LineT", bound=Line)
+_N = TypeVar("_N", int, float)
 
 _HEADLINE = "aov"
 _OTHER_FOLDER = "choose another folder with --out"
@@ -154,6 +171,133 @@ class AppendFile:
             message = "was removed, replaced or changed while the run was writing it"
             hint = f"restore it from a copy; replies that have arrived are in {CALLS}"
             raise StoreError(Problem(str(self._path), message, hint=hint))
+
+
+def begun(
+    sample: str, track: Track, model: str, item: Item, seed: int, answer: Reply | ModelError | None
+) -> dict[str, Any]:
+    """Return the fields of a record before judgement; None is a reply missing in a recording."""
+    return {
+        "sample": sample,
+        "track": track.name,
+        "model": model,
+        "key": item.key,
+        **about_item(track, item),
+        "seed": seed,
+        "reply": answer.storable() if isinstance(answer, Reply) else None,
+        "error": _error(answer) if isinstance(answer, ModelError) else None,
+        "prompt": None,
+        "parse": None,
+        "scores": (),
+        "time": datetime.now(UTC).isoformat(timespec="seconds"),
+    }
+
+
+def about_item(track: Track, item: Item) -> dict[str, Any]:
+    """Return the fields of a record about its item: its scene, and what the track adds."""
+    scene = item.scene
+    facts = {"scene": scene.id, "levels": scene.levels, "parents": scene.parents}
+    return {**facts, "n_blocks": len(scene), **track.about(item)}
+
+
+def judged(track: Track, item: Item, fields: Mapping[str, Any], judgement: Judgement) -> Record:
+    """Return the record with its outcome, and the judgement and counts of the track.
+
+    `fields` are those of a record before judgement, or of an earlier record.
+    """
+    outcome = _outcome(fields["reply"], fields["error"], judgement.is_read)
+    found = {**fields, "outcome": outcome, **judgement.fields}
+    record = track.record_type().model_validate(found)
+    if counts := track.counts(item, record):
+        record = record.model_copy(update={"counts": {**record.counts, **counts}})
+    return record
+
+
+def judge_episode(
+    track: Track, item: Item, fields: Mapping[str, Any], episode: Episode, replies: Sequence[Reply]
+) -> Record:
+    """Return the record of an episode so far, with these replies."""
+    judgement = episode.judgement()
+    if replies:
+        first = judgement.fields["turns"][0]["prompt"]
+        fields = {**fields, "reply": pooled(replies).storable(), "prompt": first}
+    return judged(track, item, fields, judgement)
+
+
+async def judge_reply(
+    track: Track,
+    item: Item,
+    fields: Mapping[str, Any],
+    earlier: Record | None = None,
+) -> Record:
+    """Return the record of a sample with one request, judged for the first time or again after an
+    `earlier` record.
+
+    If no engine could execute the reply, the record says so and can be judged again.
+    """
+    reply = fields["reply"]
+    text = None if reply is None else reply.text
+    try:
+        return judged(track, item, fields, await track.judge_apart(item, text, earlier))
+    except SimulationError as error:
+        if text is None:
+            raise
+        lacking = StoredError(kind="unjudged", message=str(error))
+        nothing = await track.judge_apart(item, None, None)
+        return judged(track, item, {**fields, "error": lacking}, nothing)
+
+
+def _outcome(reply: Reply | None, error: StoredError | None, readable: bool) -> Outcome:
+    if error is not None:
+        return "refusal" if error.kind == "refused" else "api_error"
+    if reply is None:
+        return "missing"
+    if reply.finish == "refusal":
+        return "refusal"
+    if reply.finish == "length":
+        return "truncated"
+    return "ok" if readable else "parse_failure"
+
+
+def _error(error: ModelError) -> StoredError:
+    kind: ErrorKind = "unavailable"
+    if isinstance(error, RetryableError):
+        kind = "retryable"
+    elif isinstance(error, SampleError):
+        kind = "refused" if isinstance(error, RefusedError) else "sample"
+    message, billed_usd = str(error), error.billed_usd
+    return StoredError(kind=kind, status=error.status, message=message, billed_usd=billed_usd)
+
+
+def pooled(replies: Sequence[Reply]) -> Reply:
+    """Return the sum of an episode's replies, with the text of the last one.
+
+    It counts as truncated or refused only if all of them are.
+    """
+    counts = {
+        name: _sum(getattr(reply.usage, name) for reply in replies) for name in Usage.model_fields
+    }
+    billed = [reply.billed_usd for reply in replies if reply.billed_usd is not None]
+    ends = {reply.finish for reply in replies}
+    return Reply(
+        text=replies[-1].text,
+        finish=ends.pop() if len(ends) == 1 else "stop",
+        usage=Usage(**counts),
+        cost_usd=_sum(reply.cost_usd for reply in replies),
+        billed_usd=plain_sum(billed) if billed else None,
+        latency_s=plain_sum(reply.latency_s for reply in replies),
+        provider_model=replies[-1].provider_model,
+        attempts=sum(reply.attempts for reply in replies),
+        cached=all(reply.cached for reply in replies),
+        seed_sent=all(reply.seed_sent for reply in replies),
+    )
+
+
+def _sum(values: Iterable[_N | None]) -> _N | None:
+    """Return the sum, or None if any value is unknown."""
+    found = list(values)
+    known = [value for value in found if value is not None]
+    return plain_sum(known) if known and len(known) == len(found) else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -315,14 +459,32 @@ class RunStore:
         known = {"ended": True, "billed_usd": billed_usd, "reply": stored}
         await self.calls.put(call.model_copy(update=known))
 
-    def keep_prompt(self, messages: Sequence[Message]) -> str:
-        """Write a prompt unless it is stored, and return its digest; raises as `append`."""
-        prompt = prompt_fields(messages)
-        digest: str = prompt["sha256"]
+    def keep_prompt(self, request: Request, template: str) -> SentPrompt:
+        """Write a prompt unless it is stored, and return what its record holds of it; raises as
+        `append`.
+        """
+        fields = [
+            {
+                "role": message.role,
+                "parts": [
+                    {"image": part.label} if isinstance(part, Image) else well_formed(part)
+                    for part in message.parts
+                ],
+            }
+            for message in request.messages
+        ]
+        digest = hex_digest(json.dumps(fields, sort_keys=True, separators=(",", ":")))
         if digest not in self._prompts_known:
             self._prompts_known.add(digest)
-            self._prompts.append([prompt])
-        return digest
+            self._prompts.append([{"sha256": digest, "messages": fields}])
+        images = tuple(
+            SentImage(
+                label=one.label, sha256=one.sha256, width_px=one.width_px, height_px=one.height_px
+            )
+            for one in request.images
+        )
+        version = request.prompt_version
+        return SentPrompt(template=template, version=version, messages=digest, images=images)
 
     def note_stopped(self, models: Mapping[str, str], run: str, asked: Collection[str]) -> None:
         """Write why the models among `asked`, or the whole run, were stopped.
@@ -469,19 +631,3 @@ def record_lines(records: Iterable[Record]) -> Iterator[str]:
 
 def _json_line(fields: Mapping[str, Any]) -> str:
     return json.dumps(fields, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
-
-
-def prompt_fields(messages: Sequence[Message]) -> dict[str, Any]:
-    """Return the fields of a `Prompt` of messages, with labels in place of pictures."""
-    fields = [
-        {
-            "role": message.role,
-            "parts": [
-                {"image": part.label} if isinstance(part, Image) else well_formed(part)
-                for part in message.parts
-            ],
-        }
-        for message in messages
-    ]
-    digest = hex_digest(json.dumps(fields, sort_keys=True, separators=(",", ":")))
-    return {"sha256": digest, "messages": fields}

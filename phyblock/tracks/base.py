@@ -130,6 +130,8 @@ class Track(ABC):
         self.is_blind = isinstance(self.spec, PictureControls) and self.spec.blind
         self.prompt = None if shop is None else self.open_prompt()
         self._drawings: dict[tuple[object, ...], tuple[Drawing, ...]] = {}
+        added = (measure.counted for measure in added_measures(self.name))
+        self._counted: tuple[SampleCounts, ...] = (*self.counted, *added)
         self.open()
 
     @abstractmethod
@@ -241,10 +243,9 @@ class Track(ABC):
 
         Counts are empty if their measures do not count the sample.
         """
-        added = (measure.counted for measure in added_measures(self.name))
         return {
             one.name: tuple(map(float, one.sample(item, record) or ()))
-            for one in (*self.counted, *added)
+            for one in self._counted
             if one.sample is not None
         }
 
@@ -323,7 +324,7 @@ class Track(ABC):
         version = self.prompt.version if messages and self.prompt is not None else ""
         about = subject or self.subject_of(item)
         wanted = None if form is None else form.response_format
-        return Request(key, seed, messages, params, version, about, wanted)
+        return Request(key, seed, messages, params, version, about, wanted, self.name)
 
     async def work_out(self, work: Callable[[], Any]) -> Any:
         """Return the result of `work`, a `partial`, from another process, or without a shop from a

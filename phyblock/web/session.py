@@ -14,7 +14,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Future
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -26,9 +26,9 @@ from phyblock.domain.scene import AssemblyTask
 from phyblock.errors import Problem, SpecError
 from phyblock.models.request import HaltedError, Image, Request
 from phyblock.records.record import Reply, Usage
-from phyblock.run.judge import begun, judge_reply
 from phyblock.run.plan import RunPlan, make_plan
 from phyblock.run.runner import RunEvent, RunResult, RunStarted, SampleDone, Session
+from phyblock.run.store import begun, judge_reply
 from phyblock.tracks.base import SceneTrack, kind_of
 from phyblock.tracks.picking import Pick, Picking
 from phyblock.web.ending import Ending, went
@@ -103,8 +103,8 @@ class PersonModel:
         track, seed = self._plan.tracks[0], self._plan.suite.seeds[0]
         shown = track.shown(item, seed)
         request = await track.request(shown, seed, {}, with_messages=True)
-        reply = await self._answered(replace(request, track=track.name), is_warm_up=True)
-        fields = begun("warm-up", track.name, self.name, shown, seed, reply)
+        reply = await self._answered(request, is_warm_up=True)
+        fields = begun("warm-up", track, self.name, shown, seed, reply)
         record = await judge_reply(track, shown, fields)
         self._session.warmed(went(record, self._plan.suite.scoring.matchers[0]))
 

@@ -15,8 +15,8 @@ from phyblock.domain.scene import Block, Candidate, CandidateSet, PoseStep
 from phyblock.errors import StoreError
 from phyblock.parsing.poses import parse_poses
 from phyblock.records.files import known_records
-from phyblock.run.judge import begun, judged
 from phyblock.run.rescore import rescore
+from phyblock.run.store import begun, judged
 from phyblock.scoring.plan import Goal
 from phyblock.scoring.pose import POSE_ERRORS, PoseFit, pose_errors
 from phyblock.sim.dynamics import execute
@@ -107,7 +107,7 @@ def test_a_reply_is_read_scored_and_carried_out(task, text, right, ends, errors,
     assert pose["reached"] == reached
     assert found.is_read == bool(ends)
     # Its record is written, read again and judged again, and says the same.
-    fields = begun("s", track.name, "m", task, 0, None)
+    fields = begun("s", track, "m", task, 0, None)
     record = judged(track, task, {**fields, **track.about(task)}, found)
     assert known_records().validate_json(record.as_json()) == record
     again = asyncio.run(track.judge_apart(task, text, record))
@@ -139,7 +139,7 @@ def test_where_blocks_came_to_lie_follows_from_what_each_step_moved(built_in, ba
     steps = parse_poses(text, len(item.candidates)).steps
     blocks = [put(step, item.candidates) for step in steps]
     worlds = execute(blocks).worlds
-    record = judged(track, item, begun("s", track.name, "m", item, 0, None), found)
+    record = judged(track, item, begun("s", track, "m", item, 0, None), found)
     for world, again in zip(worlds, worlds_of(blocks, record.pose.steps), strict=True):
         assert [block.order for block in again] == [block.order for block in world]
         for one, other in zip(world, again, strict=True):
