@@ -8,7 +8,6 @@ PhyblockError
 │   └── StoreError          a run folder, a record, the reply cache, the disk
 ├── ModelError              a call to a model failed
 │   ├── RetryableError      429, 5xx, connection, timeout, malformed body: ask again
-│   │   └── UnreachableError    no connection could be made, so that nothing was sent
 │   ├── SampleError         this request will never succeed (400): continue with the next
 │   │   └── RefusedError    the provider's content policy refused it
 │   └── UnavailableError    this model will never answer (401, 403, unknown): stop the model
@@ -114,42 +113,30 @@ class ModelError(PhyblockError):
     """A call to a model failed; the message is safe to store (it holds no key).
 
     `status` is the HTTP status of the server's answer, if any; `sent` is the progress of the call,
-    which decides about retries and cost.
+    which decides about retries and cost; `retry_after_s` is what the server asks for.
 
     `billed_usd` is what a run's cost limit counts for it [US dollars], all attempts included; None
     where there is no limit.
     """
 
     def __init__(
-        self, message: str, *, status: int | None = None, sent: Sent | None = None
+        self,
+        message: str,
+        *,
+        status: int | None = None,
+        sent: Sent | None = None,
+        retry_after_s: float | None = None,
     ) -> None:
         self.status = status
         self.sent: Sent = sent or ("maybe" if status is None else "answered")
+        self.retry_after_s = retry_after_s
         self.billed_usd: float | None = None
         # A server's text ends up in terminals: no escape codes, no right-to-left marks.
         super().__init__("".join(c if c.isprintable() else " " for c in message))
 
 
 class RetryableError(ModelError):
-    """The call may succeed when it is sent again, after the `retry_after_s` of the server."""
-
-    def __init__(
-        self,
-        message: str,
-        *,
-        status: int | None = None,
-        retry_after_s: float | None = None,
-        sent: Sent | None = None,
-    ) -> None:
-        self.retry_after_s = retry_after_s
-        super().__init__(message, status=status, sent=sent)
-
-
-class UnreachableError(RetryableError):
-    """No connection to the server could be made: nothing was sent, and nothing can be billed."""
-
-    def __init__(self, message: str) -> None:
-        super().__init__(message, sent="no")
+    """The call may succeed when it is sent again."""
 
 
 class SampleError(ModelError):

@@ -16,21 +16,20 @@ import contextlib
 import errno
 import fcntl
 import hashlib
-import importlib
 import io
 import itertools
 import json
 import math
 import os
-import shutil
 import stat
+import tempfile
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
-from phyblock.errors import DataError, Problem, SpecError, StoreError, reason_of
+from phyblock.errors import DataError, Problem, StoreError, reason_of
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -45,11 +44,9 @@ LONGEST_INTEGER = 300
 _DEEPEST_JSON = 64
 
 _PICTURE_FORMATS = ("PNG", "JPEG", "GIF", "WEBP")
-_PICTURES_ALLOWED = "PNG, JPEG, GIF or WebP"
-_LEAST_SIDE_PX, _MOST_SIDE_PX, _MOST_PIXELS = 8, 10_000, 40_000_000
-_SIZES_ALLOWED = (
-    f"{_LEAST_SIDE_PX} to {_MOST_SIDE_PX:,} pixels a side, {_MOST_PIXELS // 10**6} million in all"
-)
+"""Decoders of other formats start programs (EPS starts Ghostscript) or are seldom maintained."""
+_SIDES_PX, _MOST_PIXELS = (8, 10_000), 40_000_000
+_SIZES_ALLOWED = "8 to 10,000 pixels a side, 40 million in all"
 _DECODED: set[bytes] = set()
 """Digests of picture files that were decoded: each is read several times in a run."""
 
@@ -132,12 +129,14 @@ def load_json(data: bytes | str) -> Any:
         raise too_deep from None
     level = [value]
     for _ in range(_DEEPEST_JSON + 1):
-        level = [part for part in level if isinstance(part, (dict, list))]
+        level = [
+            inner
+            for part in level
+            if isinstance(part, (dict, list))
+            for inner in (part.values() if isinstance(part, dict) else part)
+        ]
         if not level:
             return value
-        level = [
-            inner for part in level for inner in (part.values() if isinstance(part, dict) else part)
-        ]
     raise too_deep
 
 
@@ -145,17 +144,17 @@ def read_picture(path: Path) -> bytes:
     """Return the bytes of a picture file. Raises DataError if it cannot be decoded."""
     try:
         data = read_bytes(path, LARGEST_PICTURE_BYTES)
-        digest = hashlib.sha256(data).digest()
-        if digest not in _DECODED:
-            with open_picture(data, str(path)) as picture:
+    except (OSError, ValueError) as error:
+        raise _no_picture(str(path), error) from error
+    digest = hashlib.sha256(data).digest()
+    if digest not in _DECODED:
+        with open_picture(data, str(path)) as picture:
+            try:
                 picture.load()
-            _DECODED.add(digest)
-    except DataError:
-        raise
-    except Exception as error:
-        # Hostile bytes can make the decoder fail in any way.
-        message = f"is not a readable picture: {reason_of(error)}"
-        raise DataError(Problem(str(path), message, allowed=_PICTURES_ALLOWED)) from error
+            except Exception as error:
+                # Hostile bytes can make the decoder fail in any way.
+                raise _no_picture(str(path), error) from error
+        _DECODED.add(digest)
     return data
 
 
@@ -164,7 +163,6 @@ def open_picture(data: bytes, where: str) -> Image:
 
     Raises DataError, at `where`, for another format or a bad size.
     """
-    # Decoders of other formats start programs (EPS starts Ghostscript) or are seldom maintained.
     from PIL import Image
 
     try:
@@ -174,15 +172,22 @@ def open_picture(data: bytes, where: str) -> Image:
             picture = Image.open(io.BytesIO(data), formats=_PICTURE_FORMATS)
     except Exception as error:
         found = f"a file that begins with {data[:12]!r}" if data else "an empty file"
-        message = f"is not a readable picture: {reason_of(error)}"
-        raise DataError(Problem(where, message, "", found, _PICTURES_ALLOWED)) from error
+        raise _no_picture(where, error, found) from error
     width, height = picture.size
-    small, large = min(width, height), max(width, height)
-    if small < _LEAST_SIDE_PX or large > _MOST_SIDE_PX or small * large > _MOST_PIXELS:
+    if (
+        min(width, height) < _SIDES_PX[0]
+        or max(width, height) > _SIDES_PX[1]
+        or (width * height > _MOST_PIXELS)
+    ):
         picture.close()
-        found, too_large = f"{width:,} x {height:,} pixels", "is a picture of a bad size"
-        raise DataError(Problem(where, too_large, "", found, _SIZES_ALLOWED))
+        found, allowed = f"{width:,} x {height:,} pixels", _SIZES_ALLOWED
+        raise DataError(Problem(where, "is a picture of a bad size", "", found, allowed))
     return picture
+
+
+def _no_picture(where: str, error: Exception, found: str = "") -> DataError:
+    message, allowed = f"is not a readable picture: {reason_of(error)}", "PNG, JPEG, GIF or WebP"
+    return DataError(Problem(where, message, "", found, allowed))
 
 
 @contextlib.contextmanager
@@ -271,32 +276,25 @@ def append_whole(number: int, data: bytes, *, sync: bool = False) -> None:
         raise
 
 
-_KIND_BYTES = 4
-
-
 def write_named(path: Path, data: bytes | Iterable[bytes]) -> None:
     """Write a file that the user named, replacing one of its kind, and create its folders.
 
-    A file is of its kind if it is empty or begins with the same four bytes, as ZIP archives, GIFs
-    and tables with the same heading do. Links are followed, since the user made them. Raises
-    StoreError if the disk fails, and if anything else is there: to replace a device would take it
-    from the whole machine.
+    A file is of its kind if it is empty or begins with the same four bytes, as ZIP archives and
+    pictures do. Links are followed, since the user made them. Raises StoreError if the disk fails,
+    and if anything else is there: to replace a device would take it from the whole machine.
     """
     pieces = iter([data] if isinstance(data, bytes) else data)
     first = next(pieces, b"")
     with writing(path):
         target = Path(os.path.realpath(path))
-        try:
-            with open_regular(target) as file:
-                is_of_its_kind = file.read(_KIND_BYTES) in (b"", first[:_KIND_BYTES])
-        except (NotRegularError, IsADirectoryError):
-            is_of_its_kind = False
-        except FileNotFoundError:
-            is_of_its_kind = True
-        if not is_of_its_kind:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        is_free = not os.path.lexists(target)
+        if target.is_file():
+            with target.open("rb") as file:
+                is_free = file.read(4) in (b"", first[:4])
+        if not is_free:
             message, hint = "is there, and of another kind", "name another file, or move it away"
             raise StoreError(Problem(str(path), f"cannot be written: it {message}", hint=hint))
-        target.parent.mkdir(parents=True, exist_ok=True)
         atomic_write(target, itertools.chain([first], pieces))
 
 
@@ -312,7 +310,7 @@ class OutFolder:
 
     `.generated` lists the names that phyblock wrote, one per line, each before its file is written.
     Everything else is the user's and is never overwritten or removed; links are never followed.
-    Names are relative paths with slashes; a name that ends in a slash is a folder's.
+    Names are relative paths with slashes; one that ends in a slash is a folder's, to be checked.
     """
 
     def __init__(self, path: Path) -> None:
@@ -323,27 +321,21 @@ class OutFolder:
 
         Nothing is written.
         """
-        names = list(names)
-        # Existing files are checked first: another process lists a name before it writes the file.
-        there = [n for n in names if not n.endswith("/") and os.path.lexists(self.path / n)]
+        # Existing files are found first: another process lists a name before it writes the file.
+        there = {n: os.path.lexists(self.path / n) and not n.endswith("/") for n in names}
         known = self._known()
         problems: dict[Path, str] = {}
-        for name in names:
-            if PurePosixPath(name).is_absolute() or ".." in PurePosixPath(name).parts:
-                problems[self.path / name] = "cannot be written: its name leads out of the folder"
-        # The folder itself may be a link: the user named it.
-        for folder in (self.path / below for below in _folders(names)):
-            if folder.is_symlink():
-                problems[folder] = _LINK
-            elif folder.exists() and not folder.is_dir():
-                problems[folder] = "cannot be written in: it is not a folder"
-        for name in there:
+        for name, is_there in there.items():
             path = self.path / name
-            if any(above in problems for above in path.parents):
-                continue
-            if path.is_symlink():
+            if PurePosixPath(name).is_absolute() or ".." in PurePosixPath(name).parts:
+                problems[path] = "cannot be written: its name leads out of the folder"
+            elif link := next((one for one in self._folders(name) if one.is_symlink()), None):
+                problems[link] = _LINK
+            elif taken := next((one for one in self._folders(name) if one.is_file()), None):
+                problems[taken] = "cannot be written in: it is not a folder"
+            elif is_there and path.is_symlink():
                 problems[path] = _LINK
-            elif name not in known or not path.is_file():
+            elif is_there and (name not in known or not path.is_file()):
                 problems[path] = "cannot be written: phyblock did not make the existing file"
         if problems:
             raise StoreError(
@@ -352,22 +344,18 @@ class OutFolder:
 
     def claim(self, names: Iterable[str]) -> None:
         """List `names` as phyblock's and make their folders; raises as `check`."""
-        names = list(names)
+        names = list(dict.fromkeys(names))
         self.check(names)
         make_folder(self.path, "choose another folder with --out")
-        path = self.path / LIST
-        with writing(path):
-            listed = self._listed()
-            known = set(listed.split("\n"))
-            lines = [n for n in dict.fromkeys(names) if not n.endswith("/") and n not in known]
-            # A crash of the machine may have cut the last line short.
-            start = "\n" if listed and not listed.endswith("\n") else ""
-            text = start + "".join(f"{line}\n" for line in ([] if listed else [_HEAD]) + lines)
-            with path.open("ab", buffering=0) as file:
-                # In one write, so that lines of two processes never mix.
-                append_whole(file.fileno(), text.encode("utf-8", "surrogateescape"))
-        for folder in _folders(names):
-            make_folder(self.path / folder, _MOVE)
+        known = self._known()
+        # A crash of the machine may have cut the last line short, so that each begins with a break.
+        lines = [] if known else [_HEAD]
+        lines += [f"\n{name}" for name in names if name not in known]
+        with writing(self.path / LIST), (self.path / LIST).open("ab", buffering=0) as file:
+            # In one write, so that lines of two processes never mix.
+            append_whole(file.fileno(), "".join(lines).encode("utf-8", "surrogateescape"))
+        for folder in {(self.path / name).parent for name in names}:
+            make_folder(folder, _MOVE)
 
     def write(self, files: Mapping[str, bytes | str | Iterable[bytes]]) -> tuple[Path, ...]:
         """Write files by name, each whole or not at all; raises as `check`, or as the disk does."""
@@ -387,76 +375,56 @@ class OutFolder:
         Nothing else in an output folder is ever removed. Raises StoreError if the disk fails.
         """
         known = self._known()
-        folders: set[str] = set()
-        for name in names:
-            path, above = self.path / name, _folders([name])
-            if name not in known or any((self.path / folder).is_symlink() for folder in above):
-                continue
-            if path.is_file() and not path.is_symlink():
+        for name in (name for name in names if name in known):
+            path, folders = self.path / name, self._folders(name)
+            if path.is_file() and not any(one.is_symlink() for one in (path, *folders)):
                 with writing(path):
                     path.unlink(missing_ok=True)
-                folders |= set(above)
-        for folder in sorted(folders, reverse=True):
-            with writing(self.path / folder):
-                if next((self.path / folder).iterdir(), None) is None:
-                    (self.path / folder).rmdir()
+                for folder in folders:
+                    # One that is not empty stays.
+                    with contextlib.suppress(OSError):
+                        folder.rmdir()
 
     @contextlib.contextmanager
-    def making(self, below: str = "") -> Iterator[Path]:
-        """Yield a temporary folder, whose files are moved to `below` in this folder at the end.
+    def making(self, below: str) -> Iterator[Path]:
+        """Yield a temporary folder, whose files are moved to the folder `below` at the end.
 
-        `below` is empty or a folder's name with its slash. If the body fails, nothing is left of
-        its files. Raises as `write`.
+        If the body fails, nothing is left of its files. Raises StoreError as `check`, and OSError
+        if the disk fails: see `writing`.
         """
-        self.claim([below] if below else [])
-        part = self.path / f".{uuid4().hex}.part"
-        with writing(self.path / below):
-            part.mkdir()
-        try:
-            yield part
-            files = sorted(path for path in part.rglob("*") if path.is_file())
-            names = [path.relative_to(part).as_posix() for path in files]
-            self.claim(below + name for name in names)
-            with writing(self.path / below):
-                for file, name in zip(files, names, strict=True):
-                    file.replace(self.path / below / name)
-        finally:
-            shutil.rmtree(part)
+        self.claim([])
+        with tempfile.TemporaryDirectory(".part", ".", self.path) as part:
+            yield Path(part)
+            made = sorted(Path(part).iterdir())
+            self.claim(f"{below}{path.name}" for path in made)
+            for path in made:
+                path.replace(self.path / below / path.name)
 
     @contextlib.contextmanager
     def alone(self) -> Iterator[None]:
         """Hold the folder's lock, after waiting for other processes."""
         self.claim([])
-        with contextlib.ExitStack() as stack:
-            with writing(self.path / LIST):
-                file = stack.enter_context((self.path / LIST).open("ab"))
-                fcntl.flock(file, fcntl.LOCK_EX)
+        with writing(self.path / LIST):
+            file = (self.path / LIST).open("ab")
+            fcntl.flock(file, fcntl.LOCK_EX)
+        with file:
             yield
 
-    def _known(self) -> set[str]:
-        return set(self._listed().split("\n"))
+    def _folders(self, name: str) -> list[Path]:
+        """Return the folders between this one and a file, the innermost first."""
+        return [self.path / above for above in PurePosixPath(f"{name}_").parents if above.name]
 
-    def _listed(self) -> str:
-        """Return the text of the list, "" if there is none."""
+    def _known(self) -> set[str]:
         path = self.path / LIST
-        with writing(path):
-            if path.is_symlink():
-                raise StoreError(Problem(str(path), _LINK, hint=_MOVE))
+        if path.is_symlink():
+            raise StoreError(Problem(str(path), _LINK, hint=_MOVE))
+        with writing(path, _MOVE):
             try:
-                return read_bytes(path).decode("utf-8", "surrogateescape")
+                return set(read_bytes(path).decode("utf-8", "surrogateescape").split("\n"))
             except FileNotFoundError:
-                return ""
+                return set()
             except ValueError as error:
                 raise StoreError(Problem(str(path), str(error), hint=_MOVE)) from error
-
-
-def _folders(names: Iterable[str]) -> list[str]:
-    """Return all folders in the paths of `names`, parents first."""
-    folders: set[str] = set()
-    for name in names:
-        path = PurePosixPath(f"{name}_" if name.endswith("/") else name)
-        folders |= {str(above) for above in path.parents}
-    return sorted(folders - {".", "/"})
 
 
 _PACKAGE = Path(__file__).parent
@@ -487,12 +455,3 @@ def cache_dir() -> Path:
 def reply_cache_file() -> Path:
     """Return the reply cache that all runs of this user share."""
     return cache_dir() / "replies.sqlite"
-
-
-def needs(package: str, extra: str, form: str) -> None:
-    """Raise SpecError naming the extra to install if a format's package is missing."""
-    try:
-        importlib.import_module(package)
-    except ImportError as error:
-        name, hint = package.partition(".")[0], f"pip install 'phyblock[{extra}]'"
-        raise SpecError(Problem(f"--to {form}", f"needs the package {name}", hint=hint)) from error

@@ -48,15 +48,10 @@ def known_track(name: str) -> type[Track]:
 
 def register_track(kind: type[Track]) -> None:
     """Add a track. Raises ValueError if its name or section is taken."""
-    taken = {name for other in known_tracks().values() for name in _names_of(other)}
-    if clash := sorted(_names_of(kind) & taken):
+    taken = {name for other in known_tracks().values() for name in (other.name, other.section)}
+    if clash := sorted({kind.name, kind.section} & taken - {""}):
         raise ValueError(f"a track or section has this name: {', '.join(clash)}")
     _registered[kind.name] = kind
-
-
-def _names_of(kind: type[Track]) -> set[str]:
-    """Return the names that stand for a track in a suite."""
-    return {kind.name, kind.section} - {""}
 
 
 def add_measure(track: str, measure: Any) -> None:
@@ -81,11 +76,6 @@ def add_baseline(track: str, name: str, rule: Callable[..., str]) -> None:
 def track_baselines(kind: type[Track]) -> Mapping[str, Callable[..., str]]:
     """Return the rules of a track by name, the built-in ones first."""
     return {**kind.baselines, **_baselines.get(kind.name, {})}
-
-
-def has_additions() -> bool:
-    """True if tracks, measures or baselines were added to the built-in ones."""
-    return bool(_registered or any(_measures.values()) or _baselines)
 
 
 def baseline_names() -> tuple[str, ...]:

@@ -21,16 +21,11 @@ LEVEL1_CRITERIA: tuple[Level1Criterion, ...] = get_args(Level1Criterion)
 Criterion = Literal["selection", "membership", "aov"]
 """Rule by which a step counts as right."""
 
-MissingPolicy = Literal["count", "skip"]
-"""Treatment of samples without a reply."""
-
 PlanParser = Literal["steps", "official"]
 """Parsers of plans."""
 
 AnswerFormat = Literal["text", "json_schema"]
 """Form of answers: lines of text, or JSON that follows a schema."""
-AskedAs = Literal["prompt", "response_format"]
-"""Place where JSON was requested: only the prompt, or also the request's `response_format`."""
 
 Gating = Literal["aov", "layer"]
 """Condition under which a block can be placed: all it rests on is placed, or all lower layers are
@@ -55,9 +50,6 @@ Background = Literal["checkerboard", "white", "light-wood", "dark-wood", "concre
 """The six backgrounds of the paper; the checkerboard, which is dark, is the default."""
 BACKGROUNDS: list[Background] = [*get_args(Background)]
 """Those of the paper, then those that plugins add."""
-PictureName = Literal["goal", "candidates"]
-PictureSource = Literal["render", "dataset"]
-PictureLayout = Literal["composite", "separate"]
 CandidateOrder = Literal["file", "shuffled"]
 """Order in which candidates are numbered and shown."""
 
@@ -75,11 +67,8 @@ FAILURES: tuple[Outcome, ...] = tuple(outcome for outcome in OUTCOMES if outcome
 """Every outcome but `ok`."""
 WITHOUT_REPLY: tuple[Outcome, ...] = ("api_error", "missing")
 """Outcomes of samples without a reply; a refusal is a reply."""
-TransportName = Literal["auto", "litellm", "direct"]
 BATCH_PROVIDERS = ("openai", "hosted_vllm", "anthropic", "gemini")
 """Prefixes of model ids whose servers may accept batches in a protocol that phyblock speaks."""
-SendMode = Literal["auto", "always", "never"]
-"""Rule for sending a field that not every provider accepts."""
 ImageDetail = Literal["auto", "low", "medium", "high", "ultra_high", "original"]
 """Detail in which a provider looks at pictures; each knows some of these."""
 

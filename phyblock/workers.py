@@ -9,7 +9,6 @@ import os
 import pickle
 import signal
 import threading
-import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
@@ -19,7 +18,7 @@ from functools import partial
 from itertools import islice
 from multiprocessing import get_context, parent_process
 from pathlib import Path
-from typing import IO, Any, TypeVar
+from typing import Any, TypeVar
 
 from phyblock.errors import InputError, PhyblockError, Problem, StoreError
 from phyblock.files import atomic_write, make_folder, read_text, writing
@@ -31,8 +30,6 @@ _RAY_RETRIES = 5
 _BATCH = 16
 _AHEAD, _SHARED_AHEAD = 16, 2
 """Batches in progress or waiting for an earlier one, by processor; fewer where each has a lock."""
-_LOOK_S = 0.1
-"""Interval at which a shard looks for a batch that another one computes."""
 
 
 def open_pool(processes: int) -> ProcessPoolExecutor:
@@ -79,14 +76,11 @@ class Workers:
     def map(self, function: Callable[[T], R], tasks: Iterable[T]) -> Iterator[R]:
         """Yield the answers in the order of the tasks."""
         call, self._calls = self._calls, self._calls + 1
-        return self._mapped(call, function, iter(tasks))
-
-    def _mapped(self, call: int, function: Callable[[T], R], tasks: Iterator[T]) -> Iterator[R]:
+        left = iter(tasks)
         started: deque[Future[list[R]] | _SharedBatch] = deque()
-        batches = iter(lambda: list(islice(tasks, self.size)), [])
         ahead = self.ahead * (self.shards.count if self.shards else 1)
         try:
-            for number, batch in enumerate(batches):
+            for number, batch in enumerate(iter(lambda: list(islice(left, self.size)), [])):
                 job = partial(self.submit, function, batch, PLUGINS)
                 started.append(self.shards.batch(call, number, job) if self.shards else job())
                 if len(started) > ahead:
@@ -126,57 +120,53 @@ class Shards:
         """True for the first shard, which writes the results of all."""
         return self.number == 1
 
-    def batch(self, call: int, number: int, job: Callable[..., Future[Any]]) -> _SharedBatch:
+    def batch(self, call: int, number: int, job: Callable[[Path], Future[Any]]) -> _SharedBatch:
         """Return a batch, which is started if it is this shard's; `job` is given a file to write.
 
         The start of a batch that another shard computes waits until its answers are needed.
         """
         batch = _SharedBatch(self._folder / f"{call:04d}-{number:06d}.pickle", job)
         if (call + number) % self.count + 1 == self.number:
-            batch.start()
+            batch.start(fcntl.LOCK_NB)
         return batch
 
 
+@dataclass
 class _SharedBatch:
-    """A batch that is computed by the shard that holds its lock, which ends with the process."""
+    """A batch that is computed by the program that holds its lock."""
 
-    def __init__(self, path: Path, job: Callable[..., Future[Any]]) -> None:
-        self._path, self._job = path, job
-        self._started: Future[Any] | None = None
-        self._lock: IO[bytes] | None = None
+    path: Path
+    job: Callable[[Path], Future[Any]]
+    started: Future[Any] | None = None
 
-    def start(self) -> None:
-        """Start the batch, unless its answers are there or another shard computes them."""
-        with writing(self._path):
-            lock = self._path.with_suffix(".lock").open("ab")
+    def start(self, waits: int = 0) -> None:
+        """Start the batch, unless its answers are there, after waiting for who computes them; with
+        LOCK_NB, leave it to them.
+        """
+        with writing(self.path):
+            lock = self.path.with_suffix(".lock").open("ab")
             try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                fcntl.flock(lock, fcntl.LOCK_EX | waits)
             except BlockingIOError:
                 lock.close()
                 return
-        self._lock = lock
-        if not self._path.exists():
-            self._started = self._job(self._path)
+        if self.path.exists():
+            lock.close()
+        else:
+            self.started = self.job(self.path)
+            # Released before the answers are needed, or two shards could wait for one another.
+            self.started.add_done_callback(lambda _: lock.close())
 
     def result(self) -> Any:
-        """Return the answers, after waiting for the shard that computes them."""
-        while self._started is None and not self._path.exists():
+        """Return the answers."""
+        if self.started is None:
             self.start()
-            if self._lock is None:
-                time.sleep(_LOOK_S)
-        try:
-            if self._started is None:
-                return pickle.loads(self._path.read_bytes())
-            return self._started.result()
-        finally:
-            self.cancel()
+        return self.started.result() if self.started else pickle.loads(self.path.read_bytes())
 
     def cancel(self) -> None:
-        """Do not start the batch, if it has not begun, and release its lock."""
-        if self._started is not None:
-            self._started.cancel()
-        if self._lock is not None:
-            self._lock.close()
+        """Do not start the batch, if it has not begun."""
+        if self.started is not None:
+            self.started.cancel()
 
 
 def _each(

@@ -313,7 +313,7 @@ def test_only_what_is_ours_is_removed_and_folders_that_are_empty_then(tmp_path):
 
 
 def make(out, name, failure=None):
-    with out.making() as folder:
+    with out.making("deep/") as folder:
         (folder / "b").write_text("ours")
         (folder / name).write_text("ours")
         if failure is not None:
@@ -322,17 +322,15 @@ def make(out, name, failure=None):
 
 def test_files_that_are_made_together_come_together_or_not_at_all(tmp_path):
     out = OutFolder(tmp_path / "out")
-    with out.making("deep/") as folder:
-        (folder / "x").mkdir()
-        (folder / "x" / "y").write_text("ours")
-    assert contents(out.path) == {"deep/x/y": "ours"}
-    put(out.path, {"mine"})
+    make(out, "a")
+    put(out.path, {"deep/mine"})
+    held = {"deep/a": "ours", "deep/b": "ours", "deep/mine": "theirs"}
     with pytest.raises(ValueError, match="stop"):
-        make(out, "a", ValueError("stop"))
+        make(out, "c", ValueError("stop"))
     with pytest.raises(StoreError, match="mine"):
         make(out, "mine")
-    assert contents(out.path) == {"deep/x/y": "ours", "mine": "theirs"}
-    assert sorted(path.name for path in out.path.iterdir()) == [LIST, "deep", "mine"]
+    assert contents(out.path) == held
+    assert sorted(path.name for path in out.path.iterdir()) == [LIST, "deep"]
 
 
 def test_a_full_disk_leaves_the_file_of_before(tmp_path):

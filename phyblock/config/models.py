@@ -36,7 +36,7 @@ from phyblock.config.yaml import expand, read_yaml
 from phyblock.errors import Problem, SpecError
 from phyblock.registry import baseline_names
 from phyblock.text import did_you_mean
-from phyblock.types import BATCH_PROVIDERS, ImageDetail, SendMode, TransportName
+from phyblock.types import BATCH_PROVIDERS, ImageDetail
 
 Kind = Literal["litellm", "replay", "baseline", "human"]
 
@@ -201,7 +201,7 @@ class ModelConfig(Section):
     api_key_env: _Variable | None = None
     """Name of the environment variable that holds the key, if it is not the provider's usual one.
     Never the key itself."""
-    transport: TransportName = "auto"
+    transport: Literal["auto", "litellm", "direct"] = "auto"
     """litellm: through the library. direct: plain HTTP, for servers that speak the OpenAI chat
     protocol. auto: direct if possible."""
     batch: Flag = False
@@ -234,11 +234,11 @@ class ModelConfig(Section):
     max_tokens, max_completion_tokens."""
     price: Tariff | None = None
     """Price; null: that of litellm's price map, else unknown."""
-    seed: SendMode = "auto"
+    seed: Literal["auto", "always", "never"] = "auto"
     """auto: seeds are sent if litellm knows that the provider accepts them, and to
     OpenAI-compatible servers named by api_base. always, never: sent, or not, in any case. Without
     seeds, repeats are independent."""
-    response_format: SendMode = "auto"
+    response_format: Literal["auto", "always", "never"] = "auto"
     """With answer_format: json_schema in the suite. auto: the schema is sent if litellm knows that
     the model accepts one, and to OpenAI-compatible servers named by api_base. always, never: sent,
     or not, in any case. The prompt always describes the format."""

@@ -48,10 +48,6 @@ from phyblock.types import (
     Criterion,
     DataFormat,
     Matcher,
-    MissingPolicy,
-    PictureLayout,
-    PictureName,
-    PictureSource,
     PlanParser,
     Setting,
     View,
@@ -130,12 +126,12 @@ class DatasetSpec(Section):
 class ImagesSpec(Section):
     """The pictures that a model is shown."""
 
-    source: PictureSource = "render"
+    source: Literal["render", "dataset"] = "render"
     """render: drawn from the scene. dataset: the official composites, whole or cut into their two
     halves; a scene without one is an error."""
-    layout: PictureLayout = "composite"
+    layout: Literal["composite", "separate"] = "composite"
     """composite: goal and candidates in one picture. separate: two pictures."""
-    order: Annotated[Unique[PictureName], Field(min_length=2, max_length=2)] = (
+    order: Annotated[Unique[Literal["goal", "candidates"]], Field(min_length=2, max_length=2)] = (
         "goal",
         "candidates",
     )
@@ -166,7 +162,7 @@ class ScoringSpec(Section):
     level1: Criterion = "selection"
     """Criterion of Level 1. selection: one-to-one, order ignored. membership: the criterion of the
     paper's Level-1 columns. aov: as at the other levels."""
-    missing: MissingPolicy = "count"
+    missing: Literal["count", "skip"] = "count"
     """Missing replies. count: their blocks count as not placed. skip: the scene is excluded, as in
     the paper."""
 
@@ -235,7 +231,7 @@ class VarySpec(Section):
     """Views of rendered scenes, as images.view."""
     candidate_order: Levels[CandidateOrder] = ()
     """Orders of the candidates, as candidates.order."""
-    layout: Levels[PictureLayout] = ()
+    layout: Levels[Literal["composite", "separate"]] = ()
     """Layouts of pictures, as images.layout."""
     repeats: Annotated[int, Field(strict=True, ge=1, le=100)] = 1
     """How often each request is sent. Only the first may be answered from the cache; each has

@@ -14,7 +14,8 @@ import pandas as pd
 
 from phyblock.api import Task, tasks
 from phyblock.data.scenes import StoredScene
-from phyblock.files import OutFolder, needs, writing
+from phyblock.errors import Problem, SpecError
+from phyblock.files import OutFolder
 from phyblock.sim.pictures import PictureStyle, candidates_png, goal_png, goal_style
 
 
@@ -75,12 +76,11 @@ def question_tasks(questions: str, data: str, limit: int | None, size_px: int) -
 
 def write(folder: Path, kind: str, rows: pd.DataFrame) -> tuple[Path, ...]:
     """Write scenes, questions or records with their card, which says what columns are pictures."""
-    needs("pyarrow", "hf", "hf")
-    out, card = OutFolder(folder), Path(__file__).with_name("cards") / f"{kind}.md"
-    files = f"{kind}.parquet", "README.md"
-    out.check(files)
-    with writing(folder), out.making() as made:
+    card = Path(__file__).with_name("cards") / f"{kind}.md"
+    try:
         # Readers take a group at once, and its rows hold pictures.
-        rows.to_parquet(made / files[0], engine="pyarrow", index=False, row_group_size=100)
-        (made / files[1]).write_bytes(card.read_bytes())
-    return tuple(folder / name for name in files)
+        table = rows.to_parquet(engine="pyarrow", index=False, row_group_size=100)
+    except ImportError as error:
+        hint = "pip install 'phyblock[hf]'"
+        raise SpecError(Problem("--to hf", "needs the package pyarrow", hint=hint)) from error
+    return OutFolder(folder).write({f"{kind}.parquet": table, "README.md": card.read_bytes()})

@@ -33,7 +33,6 @@ from phyblock.errors import (
     SampleError,
     SpecError,
     UnavailableError,
-    UnreachableError,
 )
 from phyblock.files import load_json
 from phyblock.models.request import Request, json_body, wire_params
@@ -346,8 +345,8 @@ class HttpClient:
     ) -> Answer:
         """Send once and read the answer.
 
-        Raises UnreachableError if no connection could be made in time, and RetryableError if it was
-        lost or the answer did not end in time.
+        Raises RetryableError if no connection could be made in time, if it was lost, or if the
+        answer did not end in time.
         """
         import aiohttp
         import yarl
@@ -374,7 +373,8 @@ class HttpClient:
                     response.close()
                 return Answer(response.status, response.headers, content, fault)
         except (aiohttp.ConnectionTimeoutError, aiohttp.ClientConnectorError) as error:
-            raise UnreachableError(f"no connection to {host}: {error or 'not in time'}") from None
+            said = f"no connection to {host}: {error or 'not in time'}"
+            raise RetryableError(said, sent="no") from None
         except TimeoutError:
             within = f"no whole answer within {self._timeout_s:g} s"
             raise RetryableError(within, sent="maybe") from None

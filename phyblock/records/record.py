@@ -20,7 +20,7 @@ from phyblock.domain.scene import AssemblyTask, Block
 from phyblock.errors import DataError, InputError, Problem, StoreError
 from phyblock.files import load_json
 from phyblock.text import plain_sum, well_formed
-from phyblock.types import AskedAs, Finish, Outcome, Role
+from phyblock.types import Finish, Outcome, Role
 
 LARGEST_WHOLE = 2**53
 
@@ -341,7 +341,7 @@ class Record(Line):
     """Digest of its run."""
     shown: ShownScene | None = None
     """The presentation of the scene; null: as in the file."""
-    asked: AskedAs | None = None
+    asked: Literal["prompt", "response_format"] | None = None
     """Place where a JSON answer was requested: only the `prompt`, or also the request's
     `response_format`; null: text was requested, or no model was called."""
     variant: dict[str, str] = Field(default_factory=dict)

@@ -14,7 +14,6 @@ from phyblock.errors import (
     RetryableError,
     SampleError,
     UnavailableError,
-    UnreachableError,
 )
 from phyblock.models.costs import Budget, ModelBudget
 from phyblock.models.model import (
@@ -31,7 +30,7 @@ from tests.models.test_limits import FakeTime
 from tests.servers.chassis import Faults, Running, kill, start
 from tests.servers.openai_chat import OpenAIChat
 
-REFUSED = UnreachableError("connection refused")
+REFUSED = RetryableError("connection refused", sent="no")
 LOST = RetryableError("connection refused", sent="lost")
 
 
