@@ -508,7 +508,7 @@ def load_suite(
     suite = read_section(suite_model(), source, problems).at(Variant())
 
     def existing(text: str, at: FieldPath, *, is_folder: bool = False) -> Path:
-        base = Path.cwd() if source.is_overridden(at) else path.parent
+        base = Path.cwd() if source.place(at).is_override else path.parent
         try:
             found = expand(text, base)
         except ValueError as error:

@@ -13,7 +13,7 @@ import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import yaml
 
@@ -33,6 +33,13 @@ _TOO_DEEP = f"is nested more than {_DEEPEST} levels deep"
 _LONGEST_SHOWN = 80
 _TAG = "tag:yaml.org,2002:"
 _FORM = "--set KEY=VALUE, for example --set levels=[1,2] or --set dataset.path=FOLDER"
+
+_HINTS = {
+    "\\t": "indent with spaces, not with tabs",
+    "mapping values": "put text that holds ': ' in quotes, or check the indentation",
+    "another document": "keep one document: remove the line ---",
+}
+"""Hints for PyYAML's messages, by words in them."""
 
 _SECRET = re.compile(
     r"""(?<![A-Za-z0-9])(?:
@@ -96,42 +103,44 @@ def expand(text: str, base: Path) -> Path:
     return path
 
 
+class Place(NamedTuple):
+    """The places of a key and of its value in a file, or of the override that set it."""
+
+    key: str
+    value: str
+    is_override: bool = False
+
+
 @dataclass
 class YamlSource:
-    """A YAML document: its data and the place of each part.
+    """A YAML document: its data, and the places of its parts in the order of the file.
 
-    `marks` are the marks of key and value of each path; `overridden` are the "--set ..." texts by
-    the paths that they set.
+    Overrides come last.
     """
 
     label: str
     data: Any = None
-    marks: dict[FieldPath, tuple[yaml.Mark, yaml.Mark]] = field(default_factory=dict)
-    overridden: dict[FieldPath, str] = field(default_factory=dict)
-    _lines: dict[str, tuple[int, int]] = field(default_factory=dict)
+    places: dict[FieldPath, Place] = field(default_factory=dict)
+
+    def place(self, path: FieldPath) -> Place:
+        """Return the place of the value at `path`, or of the nearest around it."""
+        ends = (path[:end] for end in range(len(path), -1, -1))
+        nearest = (self.places[end] for end in ends if end in self.places)
+        return next(nearest, Place(self.label, self.label))
 
     def where(self, path: FieldPath, *, key: bool = False) -> str:
-        """Return the place of the value at `path` (or of its key), or the nearest around it."""
-        ends = [path[:end] for end in range(len(path), -1, -1)]
-        if place := next((self.overridden[end] for end in ends if end in self.overridden), None):
-            return place
-        marks = next((self.marks[end] for end in ends if end in self.marks), None)
-        mark = None if marks is None else marks[0 if key else 1]
-        place = _place(self.label, mark)
-        self._lines[place] = (mark.line, mark.column) if mark else (0, 0)
-        return place
+        """Return the place of the value at `path` (or of its key) as text, or the nearest."""
+        place = self.place(path)
+        return place.key if key else place.value
 
     def in_order(self, problems: Iterable[Problem]) -> list[Problem]:
         """Return problems in the order of the file, those of the command line last."""
-        last = (1 << 30, 0)
-        return sorted(problems, key=lambda problem: self._lines.get(problem.where, last))
-
-    def is_overridden(self, path: FieldPath) -> bool:
-        """True if the value at `path` came from the command line."""
-        return any(path[:end] in self.overridden for end in range(1, len(path) + 1))
+        texts = dict.fromkeys(text for place in self.places.values() for text in place[:2])
+        order = {text: n for n, text in enumerate(texts)}
+        return sorted(problems, key=lambda problem: order.get(problem.where, len(order)))
 
 
-def _place(label: str, mark: yaml.Mark | None) -> str:
+def _at(label: str, mark: yaml.Mark | None) -> str:
     return label if mark is None else f"{label}:{mark.line + 1}:{mark.column + 1}"
 
 
@@ -184,43 +193,40 @@ def read_yaml(path: Path) -> YamlSource:
     return parse_yaml(text, str(path))
 
 
-def parse_yaml(text: str, label: str, most_bytes: int = LARGEST_YAML_BYTES) -> YamlSource:
-    """Read a text.
+def parse_yaml(
+    text: str, label: str, most_bytes: int = LARGEST_YAML_BYTES, base: FieldPath = ()
+) -> YamlSource:
+    """Read a text, whose data belongs at `base`.
 
     Raises SpecError if it is not YAML, holds more than plain data, or is larger or deeper than any
     legitimate file.
     """
     if len(text) > most_bytes:
         found, allowed = f"{len(text):,} characters", f"{most_bytes // 1024:,} kB at most"
-        raise SpecError(Problem(label, "is too long", "", found, allowed))
+        raise SpecError(Problem(label, "is too long", dotted(base), found, allowed))
     walker = _Walker(label, most_bytes // _BYTES_A_VALUE)
-    loader = None
+    hint, loader = "", None
     try:
         loader = _Loader(text)
         if (node := loader.get_single_node()) is not None:
-            walker.source.data = walker.build(node, node, ())
+            walker.source.data = walker.build(node, node, base)
+        return walker.source
     except yaml.MarkedYAMLError as error:
-        message = (error.problem or error.context or "unreadable").strip()
-        hints = {
-            "\\t": "indent with spaces, not with tabs",
-            "mapping values": "put text that holds ': ' in quotes, or check the indentation",
-            "another document": "keep one document: remove the line ---",
-        }
-        hint = next((hint for words, hint in hints.items() if words in message), "")
-        where = _place(label, error.problem_mark or error.context_mark)
-        raise SpecError(Problem(where, f"is not YAML: {message}", hint=hint)) from error
+        reason = (error.problem or error.context or "unreadable").strip()
+        message, found = f"is not YAML: {reason}", ""
+        hint = next((hint for words, hint in _HINTS.items() if words in reason), "")
+        where = _at(label, error.problem_mark or error.context_mark)
     except yaml.reader.ReaderError as error:
         *lines, last = text[: error.position].split("\n")
-        found = f"character U+{ord(text[error.position]):04X}"
+        message, found = "is not allowed in YAML", f"character U+{ord(text[error.position]):04X}"
         where = f"{label}:{len(lines) + 1}:{len(last) + 1}"
-        raise SpecError(Problem(where, "is not allowed in YAML", "", found)) from error
-    except RecursionError as error:
-        where = _place(label, loader.get_mark() if loader else None)
-        raise SpecError(Problem(where, _TOO_DEEP)) from error
+    except RecursionError:
+        message, found = _TOO_DEEP, ""
+        where = _at(label, loader.get_mark() if loader else None)
     finally:
         if loader is not None:
             loader.dispose()
-    return walker.source
+    raise SpecError(Problem(where, message, dotted(base), found, hint=hint))
 
 
 class _Walker:
@@ -232,7 +238,8 @@ class _Walker:
 
     def build(self, node: yaml.Node, key: yaml.Node, path: FieldPath) -> Any:
         """Return the data of a node."""
-        self.source.marks.setdefault(path, (key.start_mark, node.start_mark))
+        label = self.source.label
+        self.source.places[path] = Place(_at(label, key.start_mark), _at(label, node.start_mark))
         self._left -= 1
         if self._left < 0:
             raise self._error(node, path, f"is one of more than {self._most_values:,} values")
@@ -241,28 +248,30 @@ class _Walker:
             raise self._error(node, path[:2], _TOO_DEEP)
         kind = node.tag.removeprefix(_TAG)
         if isinstance(node, yaml.MappingNode) and kind == "map":
-            return self._mapping(node, path)
+            data: dict[str, Any] = {}
+            for key_node, value_node in node.value:
+                name = self._key(key_node, path, data)
+                data[name] = self.build(value_node, key_node, (*path, name))
+            return data
         if isinstance(node, yaml.SequenceNode) and kind == "seq":
             return [self.build(item, item, (*path, n)) for n, item in enumerate(node.value)]
         if isinstance(node, yaml.ScalarNode):
             return self._scalar(node, kind, path)
         raise self._error(node, path, "has a tag that is not allowed", node.tag)
 
-    def _mapping(self, node: yaml.MappingNode, path: FieldPath) -> dict[str, Any]:
-        data: dict[str, Any] = {}
-        for key_node, value_node in node.value:
-            if not isinstance(key_node, yaml.ScalarNode):
-                raise self._error(key_node, path, "has a key that is not plain text")
-            key = self._text(key_node, path)
-            here = (*path, key)
-            if key_node.tag == _TAG + "merge":
-                hint = "repeat the keys, or name the whole mapping with *NAME"
-                raise self._error(key_node, here, "is not supported", hint=hint)
-            if key in data:
-                hint = f"the first is at {self.source.where(here, key=True)}"
-                raise self._error(key_node, here, "is written twice", hint=hint)
-            data[key] = self.build(value_node, key_node, here)
-        return data
+    def _key(self, node: yaml.Node, path: FieldPath, data: dict[str, Any]) -> str:
+        """Return the next key of a mapping with this data."""
+        if not isinstance(node, yaml.ScalarNode):
+            raise self._error(node, path, "has a key that is not plain text")
+        key = self._text(node, path)
+        here = (*path, key)
+        if node.tag == _TAG + "merge":
+            hint = "repeat the keys, or name the whole mapping with *NAME"
+            raise self._error(node, here, "is not supported", hint=hint)
+        if key in data:
+            hint = f"the first is at {self.source.where(here, key=True)}"
+            raise self._error(node, here, "is written twice", hint=hint)
+        return key
 
     def _scalar(self, node: yaml.ScalarNode, kind: str, path: FieldPath) -> Any:
         text = self._text(node, path)
@@ -294,7 +303,7 @@ class _Walker:
     def _error(
         self, node: yaml.Node, path: FieldPath, message: str, found: str = "", hint: str = ""
     ) -> SpecError:
-        where = _place(self.source.label, node.start_mark)
+        where = _at(self.source.label, node.start_mark)
         return SpecError(Problem(where, message, dotted(path), found, hint=hint))
 
 
@@ -323,34 +332,31 @@ def apply_overrides(source: YamlSource, overrides: Iterable[str]) -> list[Proble
     """
     problems: list[Problem] = []
     for text in overrides:
-        place = "--set ..." if looks_secret(text) else f"--set {text}"
+        where = "--set ..." if looks_secret(text) else f"--set {text}"
+        place = Place(where, where, is_override=True)
         key, equals, raw = text.partition("=")
-        *above, last = parts = tuple(part.strip() for part in key.split("."))
-        if not (equals and all(parts) and len(parts) < _DEEPEST):
-            problems.append(Problem(place, "is not of the form key=value", hint=_FORM))
+        path = tuple(part.strip() for part in key.split("."))
+        if not (equals and all(path) and len(path) < _DEEPEST):
+            problems.append(Problem(where, "is not of the form key=value", hint=_FORM))
             continue
         try:
-            value = parse_yaml(raw, place).data
+            value = parse_yaml(raw, where, base=path).data
         except SpecError as error:
-            (fault,) = error.problems
-            field = f"{dotted(parts)}.{fault.field}".replace(".[", "[").rstrip(".")
-            problems.append(replace(fault, where=place, field=field, hint=QUOTE_HINT))
+            problems += [replace(one, where=where, hint=QUOTE_HINT) for one in error.problems]
             continue
         source.data = {} if source.data is None else source.data
         here = source.data
-        for end, part in enumerate(above, 1):
-            if isinstance(here, dict):
-                if here.get(part) is None:
-                    here[part] = {}
-                    source.overridden[parts[:end]] = place
-                here = here[part]
+        for end, part in enumerate(path[:-1], 1):
+            if isinstance(here, dict) and here.get(part) is None:
+                here[part] = {}
+                source.places[path[:end]] = place
+            here = here.get(part) if isinstance(here, dict) else here
         if not isinstance(here, dict):
             message = "cannot be set: it is inside a value that is not a mapping"
-            problems.append(Problem(place, message, dotted(parts), shown(here)))
+            problems.append(Problem(where, message, dotted(path), shown(here)))
             continue
-        here[last] = value
-        source.overridden = {
-            path: text for path, text in source.overridden.items() if path[: len(parts)] != parts
-        }
-        source.overridden[parts] = place
+        here[path[-1]] = value
+        for below in [one for one in source.places if one[: len(path)] == path]:
+            del source.places[below]
+        source.places[path] = place
     return problems

@@ -11,16 +11,15 @@ import json
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields
-from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
 from phyblock.config.validation import Fault
-from phyblock.config.yaml import dotted
+from phyblock.config.yaml import dotted, shown
 from phyblock.domain.question import Question
 from phyblock.domain.scene import AssemblyTask, Scene
 from phyblock.errors import DataError, Problem, reason_of
-from phyblock.files import LARGEST_PICTURE_BYTES, read_bytes
+from phyblock.files import read_bytes
 from phyblock.text import did_you_mean, hex_digest, some_of
 
 VERSION_FILE = "VERSION"
@@ -29,7 +28,8 @@ UNNUMBERED = 1
 _LARGEST_BYTES = 1024**3
 _MOST_OF_ALL = 1000
 """Maximum number of reported faults of a data set."""
-_T = TypeVar("_T")
+_ItemT = TypeVar("_ItemT")
+_TaskT = TypeVar("_TaskT", AssemblyTask, "QuestionTask")
 
 
 @dataclass(frozen=True)
@@ -49,13 +49,17 @@ class Dataset:
     def _by_scene(self) -> dict[str, AssemblyTask]:
         return {task.key: task for task in self.tasks}
 
-    def task(self, scene: str) -> AssemblyTask:
-        """Return the task of a scene. Raises DataError if there is none."""
+    def task(self, scene: str, where: str = "", field: str = "scene") -> AssemblyTask:
+        """Return the task of a scene. Raises DataError, at a place and a field that name it, if
+        there is none.
+        """
         if scene in self._by_scene:
             return self._by_scene[scene]
         allowed, hint = some_of(list(self._by_scene)), did_you_mean(scene, self._by_scene)
-        message = "holds no such scene"
-        raise DataError(Problem(str(self.root), message, "scene", scene, allowed, hint))
+        message = "is not in the data set"
+        raise DataError(
+            Problem(where or str(self.root), message, field, shown(scene), allowed, hint)
+        )
 
 
 @dataclass(frozen=True)
@@ -87,17 +91,9 @@ class QuestionSet:
     @functools.cached_property
     def sha256(self) -> str:
         """Hex digest of the questions with their scenes and of the picture files' bytes."""
-        return _digest([[task.question, _digests(task.files)] for task in self.tasks])
-
-
-def _digests(files: Mapping[str, Path]) -> dict[str, str]:
-    digests: dict[str, str] = {}
-    for label, path in sorted(files.items()):
-        try:
-            digests[label] = hex_digest(read_bytes(path, LARGEST_PICTURE_BYTES))
-        except (OSError, ValueError) as error:
-            raise DataError(Problem(str(path), f"cannot be read: {reason_of(error)}")) from error
-    return digests
+        files = [sorted(task.files.items()) for task in self.tasks]
+        digests = [{name: hex_digest(read_data(path)) for name, path in own} for own in files]
+        return _digest([[t.question, own] for t, own in zip(self.tasks, digests, strict=True)])
 
 
 def _digest(content: object) -> str:
@@ -109,9 +105,7 @@ def _digest(content: object) -> str:
 def read_version(folder: Path) -> int:
     """Return the version of the data set in a folder. Raises DataError for a bad version file."""
     path = folder / VERSION_FILE
-    if not path.exists():
-        return UNNUMBERED
-    found = read_data(path).strip()
+    found = read_data(path).strip() if path.exists() else b"%d" % UNNUMBERED
     if not re.fullmatch(rb"[1-9][0-9]{0,5}", found):
         allowed = "a whole number from 1"
         raise DataError(Problem(str(path), "holds no version", "", repr(found[:20]), allowed))
@@ -134,54 +128,42 @@ def read_set(path: Path) -> bytes:
 
 def report(faults: Iterable[Fault], where: str) -> None:
     """Raise DataError with these faults of the value at a place, if there are any."""
-    if problems := [
-        Problem(where, f.message, dotted(f.at), f.found or "", f.allowed) for f in faults
-    ]:
-        raise DataError(problems[:100])
+    some = [Problem(where, f.message, dotted(f.at), f.found or "", f.allowed) for f in faults]
+    if some:
+        raise DataError(some[:100])
 
 
 def read_each(
-    entries: Iterable[tuple[str, Callable[[], _T]]], name: Callable[[_T], str]
-) -> list[_T]:
-    """Return the values read at each place. Raises DataError with all faults and duplicate names.
+    items: Iterable[tuple[str, _ItemT]], read: Callable[[_ItemT, str], _TaskT]
+) -> tuple[_TaskT, ...]:
+    """Return what `read` makes of each item and its place.
 
-    Reading stops after a thousand faults.
+    Raises DataError with all faults and duplicate keys. Reading stops after a thousand faults.
     """
     first_use: dict[str, str] = {}
-    values: list[_T] = []
+    tasks: list[_TaskT] = []
     problems: list[Problem] = []
-    for where, read in entries:
+    for where, item in items:
         if len(problems) > _MOST_OF_ALL:
             message = f"more than {_MOST_OF_ALL:,} faults; only the first were looked for"
             raise DataError([Problem(where, message), *problems])
         try:
-            one = read()
+            task = read(item, where)
         except DataError as error:
             problems += error.problems
             continue
-        first = first_use.setdefault(name(one), where)
+        first = first_use.setdefault(task.key, where)
         if first != where:
-            problems.append(Problem(where, f"is used at {first} already", "id", repr(name(one))))
-        values.append(one)
+            problems.append(Problem(where, f"is used at {first} already", "id", repr(task.key)))
+        tasks.append(task)
     if problems:
         raise DataError(problems)
-    return values
+    return tuple(tasks)
 
 
-def read_lines(
-    path: Path,
-    content: bytes,
-    noun: str,
-    read: Callable[[bytes, str], _T],
-    name: Callable[[_T], str],
-) -> list[_T]:
-    """Return the result of `read` for every line of a file's content and its place.
-
-    Raises DataError with all problems: errors of `read`, duplicate names, a file without any
-    `noun`.
-    """
+def lines_of(path: Path, content: bytes, noun: str) -> list[tuple[str, bytes]]:
+    """Return the lines of a file with their places. Raises DataError if there are none."""
     data = content.removesuffix(b"\n")
     if b"\0" in data or not data:
         raise DataError(Problem(str(path), f"holds no {noun}s", allowed=f"one {noun} a line"))
-    places = ((f"{path}:{n}", line) for n, line in enumerate(data.split(b"\n"), 1))
-    return read_each(((where, partial(read, line, where)) for where, line in places), name)
+    return [(f"{path}:{n}", line) for n, line in enumerate(data.split(b"\n"), 1)]

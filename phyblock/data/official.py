@@ -13,19 +13,19 @@ matched to the rows of the paper's Tables 1 and 2.
 
 from __future__ import annotations
 
+import functools
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from functools import partial
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import Field, TypeAdapter
 
 from phyblock.config.validation import Fault, checked, form
 from phyblock.config.yaml import shown
 from phyblock.data.base import Dataset, QuestionSet, QuestionTask, read_data, read_each, report
-from phyblock.data.questions import Options, scene_of
+from phyblock.data.questions import Options
 from phyblock.data.scenes import (
     NAME,
     NAME_ALLOWED,
@@ -38,7 +38,6 @@ from phyblock.data.scenes import (
     candidate_set,
     look_faults,
     task_of,
-    triple,
 )
 from phyblock.domain.question import (
     LETTERS,
@@ -51,7 +50,7 @@ from phyblock.domain.question import (
 )
 from phyblock.domain.scene import MAX_CANDIDATES, AssemblyTask, CandidateSet, Scene
 from phyblock.errors import DataError, Problem
-from phyblock.files import load_json
+from phyblock.files import read_own_yaml
 from phyblock.records.record import Line, decode
 
 _GOALS = Path("data", "SCENEs_400_Goal_Jsons")
@@ -78,8 +77,7 @@ class _Goal(Line, extra="ignore"):
         levels = (1, 2) if self.level == 2 else (self.level,)
         parents = self.combined.split("_") if self.combined is not None else [name]
         blocks = tuple(stored.block() for stored in self.blocks)
-        look_at_m = None if self.lookat_pos is None else triple(self.lookat_pos)
-        return Scene(name, levels, blocks, tuple(parents), look_at_m)
+        return Scene(name, levels, blocks, tuple(parents), self.lookat_pos)
 
 
 class _Numbered(StoredCandidate):
@@ -111,17 +109,16 @@ def read_official(root: Path) -> Dataset:
 
     adapter = TypeAdapter(_Goal)
 
-    def read(goal: Path) -> AssemblyTask:
+    def read(goal: Path, where: str) -> AssemblyTask:
         name, picture = goal.stem, root / _PICTURES / f"{goal.stem}.png"
         if not re.fullmatch(NAME, name):
-            raise DataError(Problem(str(goal), "is not a name", "the file", name, NAME_ALLOWED))
-        scene = decode(adapter, read_data(goal), str(goal), _Goal).scene(name)
+            raise DataError(Problem(where, "is not a name", "the file", name, NAME_ALLOWED))
+        scene = decode(adapter, read_data(goal), where, _Goal).scene(name)
         path = root / _CANDIDATES / f"{name}_16_cand_blocks.json"
         own = picture if picture.is_file() else None
         return task_of(scene, read_candidates(path), str(path), own)
 
-    tasks = read_each(((str(goal), partial(read, goal)) for goal in goals), lambda task: task.key)
-    return Dataset("official", root, tuple(tasks))
+    return Dataset("official", root, read_each(((str(goal), goal) for goal in goals), read))
 
 
 def read_candidates(path: Path) -> CandidateSet:
@@ -150,10 +147,7 @@ def official_prompt(root: Path) -> str:
     texts: Counter[str] = Counter()
     for folder in recorded_models(root).values():
         path = min(folder.glob("*.json"))
-        try:
-            raw = load_json(read_data(path))
-        except ValueError as error:
-            raise DataError(Problem(str(path), f"is not JSON: {error}")) from error
+        raw = decode(TypeAdapter(Any), read_data(path), str(path))
         instruction = raw.get("instruction") if isinstance(raw, dict) else None
         if isinstance(instruction, str):
             texts[_PICTURE_MARKS.sub("", instruction)] += 1
@@ -181,10 +175,9 @@ def read_official_questions(folder: Path, scenes: Dataset) -> QuestionSet:
     if not files:
         allowed = "question files such as SH.json, one a subtask"
         raise DataError(Problem(str(folder), "holds no question files", allowed=allowed))
-    known = {task.scene.id: task.scene for task in scenes.tasks}
     adapter: TypeAdapter[tuple[_Question, ...]] = TypeAdapter(tuple[_Question, ...])
     names = {name: s for s in SUBTASKS for name in (s.lower(), SUBTASK_NAMES[s].replace(" ", ""))}
-    entries = []
+    items = []
     for path in files:
         subtask = names.get(re.sub(r"[^a-z]+", "", path.stem.lower()))
         if subtask is None:
@@ -192,33 +185,39 @@ def read_official_questions(folder: Path, scenes: Dataset) -> QuestionSet:
             raise DataError(Problem(str(path), "names no subtask", "the file", path.stem, allowed))
         lines = decode(adapter, read_data(path), str(path))
         for n, line in enumerate(lines):
-            read = partial(_question_task, line, n, f"{path}[{n}]", subtask, folder, known)
-            entries.append((f"{path}[{n}]", read))
-    return QuestionSet(folder.name, folder, tuple(read_each(entries, lambda task: task.key)))
+            name = line.id or f"{subtask.lower()}-{n + 1:03d}"
+            items.append((f"{path}[{n}]", (name, subtask, line)))
+
+    def read(item: tuple[str, Subtask, _Question], where: str) -> QuestionTask:
+        name, subtask, line = item
+        scene = scenes.task(line.scene_id, where, "scene_id").scene
+        shown_files = _pictures_of(name, line, folder, where)
+        # The scene is drawn where it is not among the files.
+        drawn = QuestionPicture("scene", scene.blocks, _GOAL_VIEW)
+        pictures = () if "scene" in shown_files or subtask == "OR" else (drawn,)
+        told = line.question, line.options, _answer_of(line, subtask, where), pictures
+        return QuestionTask(Question(name, subtask, scene, *told), shown_files)
+
+    return QuestionSet(folder.name, folder, read_each(items, read))
 
 
-def _question_task(
-    line: _Question,
-    n: int,
-    where: str,
-    subtask: Subtask,
-    folder: Path,
-    scenes: Mapping[str, Scene],
-) -> QuestionTask:
-    name = line.id or f"{subtask.lower()}-{n + 1:03d}"
-    scene = scene_of(line.scene_id, scenes, where)
-    wanted = {"scene": f"images/{scene.id}"}
-    for letter, option in zip(LETTERS, line.options, strict=True):
-        if is_picture_option(option):
-            wanted[letter] = f"images/{name}/{option.strip('<>')}"
+def _pictures_of(name: str, line: _Question, folder: Path, where: str) -> dict[str, Path]:
+    """Return the picture files of a question by label; that of the scene may be missing."""
+    wanted = {"scene": line.scene_id}
+    options = zip(LETTERS, line.options, strict=True)
+    wanted |= {letter: f"{name}/{o.strip('<>')}" for letter, o in options if is_picture_option(o)}
     files: dict[str, Path] = {}
     for label, picture in wanted.items():
-        paths = [folder / f"{picture}{ending}" for ending in (".png", ".jpg", ".jpeg")]
-        path = next((path for path in paths if path.is_file()), None)
-        if path is not None:
+        paths = [folder / f"images/{picture}{ending}" for ending in (".png", ".jpg", ".jpeg")]
+        if path := next((path for path in paths if path.is_file()), None):
             files[label] = path
         elif label != "scene":
             report([Fault("the file is missing", str(paths[0]), at=("options",))], where)
+    return files
+
+
+def _answer_of(line: _Question, subtask: Subtask, where: str) -> tuple[int, ...]:
+    """Return the indices of the right options, given as letters or as the options themselves."""
     is_order = subtask == "OR"
     parts = [line.answer] if isinstance(line.answer, str) else list(line.answer)
     if is_order and isinstance(line.answer, str):
@@ -234,37 +233,9 @@ def _question_task(
         allowed = "all four letters or options" if is_order else "a letter or an option"
         fault = Fault("is none of the options", allowed, shown(line.answer), ("answer",))
         report([fault], where)
-    drawn = ("scene" not in files and not is_order) * (
-        QuestionPicture("scene", scene.blocks, _GOAL_VIEW),
-    )
-    question = Question(name, subtask, scene, line.question, line.options, tuple(answer), drawn)
-    return QuestionTask(question, files)
+    return tuple(answer)
 
 
-_PUBLISHED = (
-    "Claude-3.5 Haiku", "Claude-3.5 Sonnet", "Claude-3.7 Sonnet", "Claude-3.7 Sonnet-Thinking",
-    "GPT-4o-mini", "GPT-4o", "GPT-o1", "Gemini-1.5-flash-8b", "Gemini-1.5-flash",
-    "Gemini-2.0-flash-lite", "Gemini-2.0-flash", "Gemini-2.0-flash-thinking-exp", "Qwen-VL-Max",
-    "InternVL2.5-1B", "InternVL2.5-8B", "InternVL2.5-78B", "Qwen2.5-VL-3B-Instruct",
-    "Qwen2.5-VL-7B-Instruct", "LLaVa-OneVision-0.5B", "LLaVa-OneVision-7B", "Random", "GPT-4.1",
-    "GPT-o3", "Qwen2.5-VL-72B-Instruct",
-)  # fmt: skip
-"""Rows of the paper's Table 1, then those only in Table 2."""
-_SPELLINGS = {
-    "claude-3-7": "Claude-3.7 Sonnet",
-    "claude-3-7-thinking": "Claude-3.7 Sonnet-Thinking",
-    "o1": "GPT-o1",
-    "o3": "GPT-o3",
-    "gemini-2.0-flash-lite-preview": "Gemini-2.0-flash-lite",
-    "gemini-2.0-flash-thinking": "Gemini-2.0-flash-thinking-exp",
-    **{f"qwen2.5-vl-{size}": f"Qwen2.5-VL-{size.upper()}-Instruct" for size in ("3b", "7b", "72b")},
-    **{
-        f"llava-onevision-qwen2-{size}{end}": f"LLaVa-OneVision-{size.upper()}"
-        for size in ("0.5b", "7b")
-        for end in ("", "-ov", "-ov-hf")
-    },
-}
-"""Other spellings of rows."""
 _TOKEN = re.compile(r"[a-z]+|[0-9]+|[^\W_]+")
 _MONTH, _DAY = "(?:0[1-9]|1[0-2])", "(?:0[1-9]|[12][0-9]|3[01])"
 _DATE = re.compile(rf"(?<![0-9])20[0-9]{{2}}[-_./ ]?{_MONTH}(?:[-_./ ]?{_DAY})?(?![0-9])")
@@ -279,7 +250,13 @@ def match_published(name: str) -> str | None:
     all tokens (runs of letters and of digits) must match a known spelling. None if the name is
     unknown or ambiguous: "claude-3-5" matches two models, "gemini-2.0" four.
     """
-    return _ROWS.get(_tokens(name))
+    return _rows().get(_tokens(name))
+
+
+@functools.cache
+def _rows() -> dict[tuple[str, ...], str]:
+    rows = read_own_yaml(Path(__file__).with_name("published.yaml"))
+    return {_tokens(name): row for row, others in rows.items() for name in (row, *others)}
 
 
 def _tokens(name: str) -> tuple[str, ...]:
@@ -288,9 +265,3 @@ def _tokens(name: str) -> tuple[str, ...]:
     for pattern in (_RELEASE, _SHORT_DATE, _RELEASE):
         bare = pattern.sub("", bare).rstrip("-_. @")
     return tuple(_TOKEN.findall(bare))
-
-
-_ROWS = {
-    **{_tokens(row): row for row in _PUBLISHED},
-    **{_tokens(name): row for name, row in _SPELLINGS.items()},
-}

@@ -5,7 +5,7 @@ Pictures are recipes: each describes its differences from the question's scene.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
@@ -14,7 +14,15 @@ from pydantic import Field, StrictInt, TypeAdapter
 
 from phyblock.config.validation import BackgroundName, Fault, ShapeName, SubtaskName, checked
 from phyblock.config.yaml import shown
-from phyblock.data.base import Dataset, QuestionSet, QuestionTask, read_lines, read_set, report
+from phyblock.data.base import (
+    Dataset,
+    QuestionSet,
+    QuestionTask,
+    lines_of,
+    read_each,
+    read_set,
+    report,
+)
 from phyblock.data.scenes import (
     MAX_BLOCKS,
     Angles,
@@ -24,7 +32,6 @@ from phyblock.data.scenes import (
     StoredBlock,
     Text,
     View,
-    triple,
 )
 from phyblock.domain.blocks import Color
 from phyblock.domain.question import (
@@ -36,9 +43,8 @@ from phyblock.domain.question import (
     category_of,
     is_picture_option,
 )
-from phyblock.domain.scene import Block, Scene
+from phyblock.domain.scene import Scene
 from phyblock.records.record import Line, decode
-from phyblock.text import some_of
 from phyblock.types import Background
 
 QUESTIONS_FILE = "questions.jsonl"
@@ -101,21 +107,22 @@ class StoredPicture(Line, extra="forbid"):
     def of(cls, picture: QuestionPicture, scene: Scene) -> Self:
         """Return the stored form of a recipe."""
         known = {block.order: block for block in scene.blocks}
-        drawn = {block.order: block for block in picture.blocks}
-        kept = [(known[order], block) for order, block in drawn.items() if order in known]
-        recipe: dict[str, Any] = {
+        drawn = {block.order for block in picture.blocks}
+        poses, swap, add = {}, {}, []
+        for new in picture.blocks:
+            old, name = known.get(new.order), str(new.order)
+            if old is None:
+                add.append(StoredBlock.of(new))
+                continue
+            if (old.position_m, old.euler_deg) != (new.position_m, new.euler_deg):
+                poses[name] = {"position": new.position_m, "euler": new.euler_deg}
+            if old.kind != new.kind:
+                swap[name] = {"type": new.type, "color": new.color}
+        recipe = {
             "without": [order for order in known if order not in drawn],
-            "poses": {
-                str(new.order): {"position": new.position_m, "euler": new.euler_deg}
-                for old, new in kept
-                if (old.position_m, old.euler_deg) != (new.position_m, new.euler_deg)
-            },
-            "swap": {
-                str(new.order): {"type": new.type, "color": new.color}
-                for old, new in kept
-                if old.kind != new.kind
-            },
-            "add": [StoredBlock.of(block) for order, block in drawn.items() if order not in known],
+            "poses": poses,
+            "swap": swap,
+            "add": add,
             "marks": [{"letter": m.letter, "position": m.position_m} for m in picture.marks],
             "framed": picture.framed == scene.blocks or [*map(StoredBlock.of, picture.framed)],
         }
@@ -124,27 +131,16 @@ class StoredPicture(Line, extra="forbid"):
 
     def picture(self, scene: Scene, background: Background | None) -> QuestionPicture:
         """Return the picture of a scene by this recipe."""
-        kept = (block for block in scene.blocks if block.order not in self.without)
-        added = (stored.block() for stored in self.add)
-        azimuth, elevation, _ = triple((*self.view, 0.0))
-        framed = scene.blocks if self.framed is True else (b.block() for b in self.framed)
-        return QuestionPicture(
-            self.label,
-            (*map(self._changed, kept), *added),
-            (azimuth, elevation),
-            tuple(Mark(mark.letter, triple(mark.position)) for mark in self.marks),
-            tuple(framed),
-            background,
-        )
-
-    def _changed(self, block: Block) -> Block:
-        name = str(block.order)
-        if kind := self.swap.get(name):
-            block = replace(block, type=kind.type, color=kind.color)
-        if pose := self.poses.get(name):
-            position_m, euler_deg = triple(pose.position), triple(pose.euler)
-            block = replace(block, position_m=position_m, euler_deg=euler_deg)
-        return block
+        drawn = [b for b in scene.blocks if b.order not in self.without]
+        for n, block in enumerate(drawn):
+            if kind := self.swap.get(str(block.order)):
+                drawn[n] = replace(drawn[n], type=kind.type, color=kind.color)
+            if pose := self.poses.get(str(block.order)):
+                drawn[n] = replace(drawn[n], position_m=pose.position, euler_deg=pose.euler)
+        drawn += [stored.block() for stored in self.add]
+        framed = scene.blocks if self.framed is True else tuple(b.block() for b in self.framed)
+        marks = tuple(Mark(mark.letter, mark.position) for mark in self.marks)
+        return QuestionPicture(self.label, tuple(drawn), self.view, marks, framed, background)
 
     def faults(self, scene: Scene) -> Iterator[Fault]:
         """Yield its faults as a picture of a scene."""
@@ -222,39 +218,26 @@ class StoredQuestion(Line, extra="forbid"):
     @classmethod
     def of(cls, question: Question, original: Scene) -> Self:
         """Return the stored form of a question; `original` is the scene as stored."""
+        about = {name: getattr(question, name) for name in ("id", "subtask", "category", "wording")}
+        about |= {"scene_id": question.scene.id, "question": question.text}
+        about |= {"options": question.options, "answer": question.answer_letters}
         pairs = zip(question.scene.blocks, original.blocks, strict=True)
-        colors = {str(new.order): new.color for new, old in pairs if new.color != old.color}
-        background = question.pictures[0].background if question.pictures else None
-        optional: dict[str, Any] = {"colors": colors, "background": background}
-        same = ("id", "subtask", "category", "wording", "options")
-        return cls(
-            **{name: getattr(question, name) for name in same},
-            scene_id=question.scene.id,
-            question=question.text,
-            answer=question.answer_letters,
-            **{name: value for name, value in optional.items() if value},
-            pictures=tuple(StoredPicture.of(p, question.scene) for p in question.pictures),
-            evidence=dict(question.evidence),
-        )
+        if colors := {str(new.order): new.color for new, old in pairs if new.color != old.color}:
+            about["colors"] = colors
+        if question.pictures and question.pictures[0].background is not None:
+            about["background"] = question.pictures[0].background
+        about["pictures"] = [StoredPicture.of(one, question.scene) for one in question.pictures]
+        return cls.model_validate({**about, "evidence": dict(question.evidence)})
 
     def about(self, original: Scene) -> Question:
         """Return the question about its scene, which is given as stored."""
-        blocks = tuple(
-            replace(block, color=self.colors.get(str(block.order), block.color))
-            for block in original.blocks
-        )
-        scene = replace(original, blocks=blocks)
-        return Question(
-            self.id,
-            self.subtask,
-            scene,
-            self.question,
-            self.options,
-            tuple(map(LETTERS.index, self.answer)),
-            tuple(picture.picture(scene, self.background) for picture in self.pictures),
-            self.wording,
-            self.evidence,
-        )
+        colors = {block.order: self.colors.get(str(block.order)) for block in original.blocks}
+        blocks = (replace(b, color=colors[b.order] or b.color) for b in original.blocks)
+        scene = replace(original, blocks=tuple(blocks))
+        answer = tuple(map(LETTERS.index, self.answer))
+        pictures = tuple(picture.picture(scene, self.background) for picture in self.pictures)
+        told = self.question, self.options, answer, pictures, self.wording, self.evidence
+        return Question(self.id, self.subtask, scene, *told)
 
     def faults(self, scene: Scene) -> Iterator[Fault]:
         """Yield its faults as a question about a scene."""
@@ -288,26 +271,16 @@ def _wrong(field: str, message: str, allowed: str, found: object) -> Fault:
     return Fault(message, allowed, shown(found), (field,))
 
 
-def scene_of(name: str, scenes: Mapping[str, Scene], where: str) -> Scene:
-    """Return the scene of a question. Raises DataError if the data set does not have it."""
-    if name not in scenes:
-        message, allowed = "names no scene of the data set", some_of(list(scenes))
-        report([_wrong("scene_id", message, allowed, name)], where)
-    return scenes[name]
-
-
 def read_questions(folder: Path, scenes: Dataset) -> QuestionSet:
     """Return all questions of a folder, about these scenes. Raises DataError with all problems."""
-    known = {task.scene.id: task.scene for task in scenes.tasks}
-
     adapter = TypeAdapter(StoredQuestion)
 
     def read(line: bytes, where: str) -> QuestionTask:
         stored = decode(adapter, line, where, StoredQuestion)
-        scene = scene_of(stored.scene_id, known, where)
+        scene = scenes.task(stored.scene_id, where, "scene_id").scene
         report(stored.faults(scene), where)
         return QuestionTask(stored.about(scene))
 
     path = folder / QUESTIONS_FILE
-    tasks = read_lines(path, read_set(path), "question", read, lambda task: task.key)
-    return QuestionSet(folder.name, folder, tuple(tasks))
+    tasks = read_each(lines_of(path, read_set(path), "question"), read)
+    return QuestionSet(folder.name, folder, tasks)

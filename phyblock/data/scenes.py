@@ -12,11 +12,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, AliasChoices, Field, StrictInt, TypeAdapter
+from pydantic import AfterValidator, AliasChoices, Field, PlainSerializer, StrictInt, TypeAdapter
 
 from phyblock.config.validation import Fault, OneOf, ShapeName, checked, form
 from phyblock.config.yaml import shown
-from phyblock.data.base import Dataset, read_lines, read_set, report
+from phyblock.data.base import Dataset, lines_of, read_each, read_set, report
 from phyblock.domain.blocks import Color
 from phyblock.domain.scene import (
     MAX_CANDIDATES,
@@ -35,20 +35,18 @@ MAX_BLOCKS = 40
 NAME = r"^[A-Za-z0-9][A-Za-z0-9._-]{0,99}$"
 NAME_ALLOWED = "up to 100 letters, digits, '.', '_' or '-', a letter or digit first"
 _LEVELS = ((1,), (2,), (3,), (4,), (5,), (1, 2))
-Vector = tuple[float, float, float]
-
-
-def plain(number: float) -> float:
-    """Return a whole number as an integer, which is easier to read in a file."""
-    return int(number) if float(number).is_integer() else number
-
-
+# Without -0.0, so that equal scenes have equal digests.
+_UNSIGNED_ZERO = AfterValidator(lambda number: number + 0.0)
+# Whole numbers are easier to read in a file as integers.
+_PLAIN = PlainSerializer(lambda number: int(number) if number.is_integer() else number)
 # Bounds are far above any use, and small enough for exact geometry.
-_PLAIN = AfterValidator(plain)
-_Length = Annotated[float, Field(strict=True, ge=-100, le=100, allow_inf_nan=False)]
+_LENGTHS = Field(strict=True, ge=-100, le=100, allow_inf_nan=False)
+_ANGLES = Field(strict=True, ge=-36_000, le=36_000, allow_inf_nan=False)
+_ELEVATIONS = Field(strict=True, ge=1, le=90, allow_inf_nan=False)
+_Length = Annotated[float, _LENGTHS, _UNSIGNED_ZERO]
 _Meters = Annotated[_Length, _PLAIN]
-_Degrees = Annotated[float, Field(strict=True, ge=-36_000, le=36_000, allow_inf_nan=False), _PLAIN]
-_Elevation = Annotated[float, Field(strict=True, ge=1, le=90, allow_inf_nan=False), _PLAIN]
+_Degrees = Annotated[float, _ANGLES, _UNSIGNED_ZERO, _PLAIN]
+_Elevation = Annotated[float, _ELEVATIONS, _PLAIN]
 Position = tuple[_Meters, _Meters, _Meters]
 """A point [m]."""
 Angles = tuple[_Degrees, _Degrees, _Degrees]
@@ -68,12 +66,6 @@ Text = Annotated[str, form(r"\S", "a text that is not blank")]
 # The paper's text calls the field `orientation`, the released files `euler`.
 EITHER_NAME = Field(validation_alias=AliasChoices("euler", "orientation"))
 """An orientation, by either name."""
-
-
-def triple(numbers: Vector) -> Vector:
-    """Return floats, without -0.0, so that equal scenes have equal digests."""
-    x, y, z = numbers
-    return float(x) + 0.0, float(y) + 0.0, float(z) + 0.0
 
 
 class StoredBlock(Line, extra="ignore"):
@@ -97,21 +89,14 @@ class StoredBlock(Line, extra="ignore"):
     @classmethod
     def of(cls, block: Block) -> Self:
         """Return the stored form of a block."""
-        return cls(
-            order=block.order,
-            type=block.type,
-            color=block.color,
-            layer=block.layer,
-            depend=block.depend or (0,),
-            position=block.position_m,
-            euler=block.euler_deg,
-        )
+        pose = {"position": block.position_m, "euler": block.euler_deg}
+        return cls.model_validate({**vars(block), **pose, "depend": block.depend or (0,)})
 
     def block(self) -> Block:
         """Return the block of the line."""
         depend = tuple(order for order in self.depend if order)
-        position_m, euler_deg = triple(self.position), triple(self.euler)
-        return Block(self.order, self.type, self.color, position_m, euler_deg, depend, self.layer)
+        pose = self.position, self.euler
+        return Block(self.order, self.type, self.color, *pose, depend, self.layer)
 
 
 class SceneBlock(StoredBlock):
@@ -136,25 +121,27 @@ class StoredCandidate(Line, extra="ignore"):
     @functools.cached_property
     def candidate(self) -> Candidate:
         """Return the candidate of the line."""
-        return Candidate(self.type, self.color, triple(self.euler))
+        return Candidate(self.type, self.color, self.euler)
+
+
+def _graph(blocks: Sequence[StoredBlock]) -> AOVGraph:
+    vertex = {block.order: v for v, block in enumerate(blocks)}
+    return AOVGraph(tuple(frozenset(vertex[o] for o in b.depend if o) for b in blocks))
 
 
 def _block_faults(blocks: Sequence[StoredBlock]) -> Iterator[Fault]:
     """Yield duplicate orders, else dependencies on unknown blocks, else a cycle."""
     orders = [block.order for block in blocks]
-    if twice := [i for i, order in enumerate(orders) if order in orders[:i]]:
-        for i in twice:
-            yield Fault("is used twice", "unique orders", str(orders[i]), (i, "order"))
-        return
+    twice = [i for i, order in enumerate(orders) if order in orders[:i]]
+    for i in twice:
+        yield Fault("is used twice", "unique orders", str(orders[i]), (i, "order"))
     known = "0 (the ground) or an order of the scene: " + ", ".join(map(str, sorted(orders)))
-    unknown = False
-    for i, block in enumerate(blocks):
-        for order in block.depend:
-            if order and order not in orders:
-                unknown = True
-                yield Fault("names no block", known, str(order), (i, "depend"))
+    needed = [(i, order) for i, block in enumerate(blocks) for order in block.depend if order]
+    dangling = [(i, order) for i, order in needed if order not in orders and not twice]
+    for i, order in dangling:
+        yield Fault("names no block", known, str(order), (i, "depend"))
     try:
-        if not unknown:
+        if not twice and not dangling:
             _graph(blocks)
     except CycleError as error:
         cycle = " -> ".join(str(orders[v]) for v in (*error.vertices, error.vertices[0]))
@@ -167,11 +154,6 @@ def _layer_faults(blocks: Sequence[StoredBlock]) -> Iterator[Fault]:
         if block.layer != layer:
             wanted = f"{layer}, the longest path of dependencies"
             yield Fault("is wrong", wanted, str(block.layer), (i, "layer"))
-
-
-def _graph(blocks: Sequence[StoredBlock]) -> AOVGraph:
-    vertex = {block.order: v for v, block in enumerate(blocks)}
-    return AOVGraph(tuple(frozenset(vertex[o] for o in b.depend if o) for b in blocks))
 
 
 def look_faults(candidates: Sequence[StoredCandidate]) -> Iterator[Fault]:
@@ -276,5 +258,5 @@ def _read_scenes(folder: Path, content: bytes) -> Dataset:
         stored = decode(adapter, line, where, StoredScene)
         return task_of(stored.scene(), candidate_set(stored.candidates), where)
 
-    tasks = read_lines(folder / SCENES_FILE, content, "scene", read, lambda task: task.key)
+    tasks = read_each(lines_of(folder / SCENES_FILE, content, "scene"), read)
     return Dataset(folder.name, folder, tuple(sorted(tasks, key=lambda task: task.key)))

@@ -1,12 +1,13 @@
 """Bad files, and what is said of them: the tables `bad_suites.yaml` and `bad_models.yaml`."""
 
+import contextlib
 import json
-import os
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import pytest
 import yaml
 
 from phyblock.config.models import load_models
@@ -16,8 +17,7 @@ from phyblock.errors import SpecError
 
 def table(name: str) -> list[dict[str, Any]]:
     """The entries of a table."""
-    text = Path(__file__).with_name(name).read_text(encoding="utf-8")
-    return yaml.safe_load(text)
+    return yaml.safe_load(Path(__file__).with_name(name).read_text(encoding="utf-8"))
 
 
 def told(folder: Path, kind: str, text: str, sets: Sequence[str] = ()) -> str:
@@ -25,18 +25,9 @@ def told(folder: Path, kind: str, text: str, sets: Sequence[str] = ()) -> str:
     (folder / "brief.j2").write_text("{% block user %}go{% endblock %}", encoding="utf-8")
     path = folder / f"{kind}.yaml"
     path.write_text(text, encoding="utf-8")
-    before = Path.cwd()
-    os.chdir(folder)
-    try:
-        if kind == "models":
-            load_models(path)
-        else:
-            load_suite(path, sets)
-    except SpecError as error:
-        return str(error).replace(f"{folder}/", "") + "\n"
-    finally:
-        os.chdir(before)
-    raise AssertionError(f"nothing is wrong with {text}")
+    with contextlib.chdir(folder), pytest.raises(SpecError) as caught:
+        load_models(path) if kind == "models" else load_suite(path, sets)
+    return str(caught.value).replace(f"{folder}/", "") + "\n"
 
 
 def rewrite(name: str, kind: str) -> None:

@@ -58,9 +58,6 @@ def test_places_of_keys_and_values():
     assert source.where(("b", 1, "x")) == source.where(("b", 1)) == "f.yaml:4:5"
     assert source.where(("x", "y")) == "f.yaml:1:1"
     assert dotted(("images", "order", 1, "x")) == "images.order[1].x"
-
-
-def test_anchors():
     source = parse_yaml("base: &b {x: 1, y: 2}\nsame: *b\n", "f")
     assert source.data["same"] == source.data["base"] == {"x": 1, "y": 2}
 

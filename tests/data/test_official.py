@@ -112,26 +112,18 @@ def record(root, model, scene, raw):
     (folder / f"{scene}.json").write_text(json.dumps(raw), encoding="utf-8")
 
 
-def test_recorded_models_are_the_folders_that_hold_replies(tmp_path):
-    with pytest.raises(DataError, match="holds no recorded replies"):
-        recorded_models(tmp_path)
+def test_recordings_are_folders_and_the_prompt_is_what_most_of_them_carry(tmp_path):
     (tmp_path / "outputs" / "empty").mkdir(parents=True)
     with pytest.raises(DataError, match="holds no recorded replies"):
         recorded_models(tmp_path)
-    record(tmp_path, "b", "000", {})
-    record(tmp_path, "a", "000", {})
-    assert list(recorded_models(tmp_path)) == ["a", "b"]
-
-
-def test_the_official_prompt_is_what_most_recordings_carry(tmp_path):
     record(tmp_path, "plain", "000", {"choices": []})
     with pytest.raises(DataError, match="no recording carries the official prompt"):
         official_prompt(tmp_path)
-    record(tmp_path, "a", "000", {"instruction": "<IMG_CONTEXT><IMG_CONTEXT>Build it."})
     record(tmp_path, "b", "000", {"instruction": "<|image_pad|><|image_pad|>Build it."})
-    assert official_prompt(tmp_path) == "Build it."
+    record(tmp_path, "a", "000", {"instruction": "<IMG_CONTEXT><IMG_CONTEXT>Build it."})
     record(tmp_path, "c", "000", {"instruction": "<image>\n<image>Build this."})
     assert official_prompt(tmp_path) == "Build it."
+    assert list(recorded_models(tmp_path)) == ["a", "b", "c", "plain"]
     record(tmp_path, "d", "000", {"instruction": "Build this."})
     with pytest.raises(DataError, match="different prompts"):
         official_prompt(tmp_path)
@@ -180,12 +172,6 @@ def draw(folder, *names):
         Image.new("RGB", (8, 8), "red").save(path)
 
 
-def problems(folder, towers):
-    with pytest.raises(DataError) as caught:
-        read_official_questions(folder, towers)
-    return [str(problem) for problem in caught.value.problems]
-
-
 def test_texts_pictures_and_orders_are_read(tmp_path, towers):
     write(tmp_path, "color.json", [COLOR, {**COLOR, "id": "mine", "answer": "blue"}])
     write(tmp_path, "PD.json", [NEXT])
@@ -207,36 +193,29 @@ def test_texts_pictures_and_orders_are_read(tmp_path, towers):
 
 
 FAULTS = [
-    ({"answer": "E"}, "answer: is none of the options"),
-    ({"answer": "purple"}, "answer: is none of the options"),
-    ({"scene_id": "t9"}, "scene_id: names no scene of the data set"),
-    ({"options": NEXT["options"]}, "options: the file is missing"),
-    ({"id": "co-001"}, "id: is used at"),
+    ("CO.json", "{", ":2: is not JSON"),
+    ("CO.json", {"scene_id": 1}, ": has the wrong type"),
+    ("CO.json", [3], ": [0]: has the wrong type"),
+    ("CO.json", [{**COLOR, "options": ["red", "blue"]}], ": [0].options: are not four"),
+    ("CO.json", [{**COLOR, "answer": 2}], ": [0].answer: has the wrong type"),
+    ("CO.json", [COLOR, {**COLOR, "answer": "E"}], "[1]: answer: is none of the options"),
+    ("CO.json", [{**COLOR, "answer": "purple"}], "[0]: answer: is none of the options"),
+    ("CO.json", [{**COLOR, "scene_id": "t9"}], "[0]: scene_id: is not in the data set"),
+    ("CO.json", [{**COLOR, "options": NEXT["options"]}], "[0]: options: the file is missing"),
+    ("CO.json", [COLOR, {**COLOR, "id": "co-001"}], "[1]: id: is used at"),
+    ("nonsense.json", [COLOR], ": the file: names no subtask"),
 ]
 
 
-@pytest.mark.parametrize(("change", "message"), FAULTS)
-def test_each_fault_is_one_error_with_file_and_place(tmp_path, towers, change, message):
-    write(tmp_path, "CO.json", [COLOR, {**COLOR, **change}])
-    (problem,) = problems(tmp_path, towers)
-    assert problem.startswith(f"{tmp_path / 'CO.json'}[1]: {message}")
-
-
-@pytest.mark.parametrize(
-    ("name", "content", "message"),
-    [
-        ("CO.json", "{", "is not JSON"),
-        ("CO.json", '{"scene_id": 1}', "has the wrong type"),
-        ("CO.json", "[3]", "has the wrong type"),
-        ("nonsense.json", [COLOR], "names no subtask"),
-        ("CO.jsonl", "{}", "holds no question files"),
-        ("CO.json", [{**COLOR, "options": ["red", "blue"]}], "are not four"),
-        ("CO.json", [{**COLOR, "answer": 2}], "has the wrong type"),
-    ],
-)
-def test_files_that_are_no_questions_are_said(tmp_path, towers, name, content, message):
+@pytest.mark.parametrize(("name", "content", "said"), FAULTS)
+def test_each_fault_is_one_error_with_file_and_place(tmp_path, towers, name, content, said):
+    with pytest.raises(DataError, match="holds no question files"):
+        read_official_questions(tmp_path, towers)
     write(tmp_path, name, content)
-    assert any(message in problem for problem in problems(tmp_path, towers))
+    with pytest.raises(DataError) as caught:
+        read_official_questions(tmp_path, towers)
+    (problem,) = caught.value.problems
+    assert str(problem).startswith(f"{tmp_path / name}{said}")
 
 
 SPELLINGS = {

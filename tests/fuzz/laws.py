@@ -11,7 +11,6 @@ import hashlib
 import json
 import os
 import shutil
-import stat
 import subprocess
 import tempfile
 from collections import Counter
@@ -52,21 +51,17 @@ class Broken:
         return f"law {self.law}: {self.kind}"
 
 
-class Deed(NamedTuple):
-    """A change to a file or a connection, and the path or the address that it is about."""
-
-    event: str
-    about: str
-
-
 @dataclass(frozen=True)
 class Ended:
-    """The end of a command: code None where it hung, negative where a signal ended the process."""
+    """The end of a command: code None where it hung, negative where a signal ended the process.
+
+    `deeds` are changes to files and connections, each an event and what it is about.
+    """
 
     code: int | None
     out: str
     err: str
-    deeds: tuple[Deed, ...]
+    deeds: tuple[tuple[str, str], ...]
 
 
 def run_watched(
@@ -79,7 +74,7 @@ def run_watched(
             done = fork_server().run(args, folder, env, timeout_s=longest_s, deeds=file)
             code, out, err = done.code, done.out, done.err
         file.seek(0)
-        return Ended(code, out, err, tuple(Deed(*json.loads(line)) for line in file))
+        return Ended(code, out, err, tuple(tuple(json.loads(line)) for line in file))
 
 
 class Watch:
@@ -91,48 +86,38 @@ class Watch:
 
     def __init__(self, root: Path, may_write: Sequence[str], lasting: Sequence[str] = ()) -> None:
         self._root, self._may_write, self._lasting = root, may_write, lasting
-        self._tree, self._lines = take_tree(root), _whole_lines(root)
+        self._tree, self._lines = _tree(root), _whole_lines(root)
 
     def broken(self, ended: Ended) -> list[Broken]:
         """Every law that a command broke since the last look."""
-        before, after = self._tree, take_tree(self._root)
+        before, after = self._tree, _tree(self._root)
         lines, kept = self._lines, _whole_lines(self._root)
         self._tree, self._lines = after, kept
         found = list(_ending_broken(ended))
         for path in sorted(before.keys() | after.keys()):
             same = before.get(path) == after.get(path)
             if not same and (path in self._lasting or not _lies_in(path, self._may_write)):
-                change = "changed" if path in after and path in before else "made"
-                change = change if path in after else "deleted"
-                found.append(Broken(2, f"a file was {change}", path))
+                kind = "changed" if path in before else "made"
+                found.append(Broken(2, f"a file was {kind if path in after else 'deleted'}", path))
         places = [os.path.realpath(self._root / place) for place in self._may_write]
-        found += [broken for deed in ended.deeds for broken in _judge(deed, places)]
+        found += [broken for deed in ended.deeds for broken in _judge(*deed, places)]
         for name, line in lines - kept:
             detail = line[:300].decode("utf-8", "replace")
             found.append(Broken(3, f"a line of {Path(name).name} is lost", detail))
         return found
 
 
-def take_tree(root: Path) -> dict[str, tuple[str, str]]:
+def _tree(root: Path) -> dict[str, tuple[str, str]]:
     """Everything below a folder by relative path; links are not followed."""
-    return {str(Path(entry.path).relative_to(root)): _look(entry) for entry in _walk(root)}
+    return {str(path.relative_to(root)): _look(path) for path in root.rglob("*")}
 
 
-def _walk(folder: Path) -> Iterator[os.DirEntry[str]]:
-    with os.scandir(folder) as entries:
-        for entry in entries:
-            yield entry
-            if entry.is_dir(follow_symlinks=False):
-                yield from _walk(Path(entry.path))
-
-
-def _look(entry: os.DirEntry[str]) -> tuple[str, str]:
-    mode = entry.stat(follow_symlinks=False).st_mode
-    if stat.S_ISLNK(mode):
-        return "link", os.readlink(entry.path)
-    if not stat.S_ISREG(mode):
-        return "folder" if stat.S_ISDIR(mode) else "other", ""
-    return "file", hashlib.md5(Path(entry.path).read_bytes()).hexdigest()
+def _look(path: Path) -> tuple[str, str]:
+    if path.is_symlink():
+        return "link", os.readlink(path)
+    if path.is_file():
+        return "file", hashlib.md5(path.read_bytes()).hexdigest()
+    return "folder" if path.is_dir() else "other", ""
 
 
 def _ending_broken(ended: Ended) -> Iterator[Broken]:
@@ -148,38 +133,29 @@ def _ending_broken(ended: Ended) -> Iterator[Broken]:
         yield Broken(1, "exit code 2 without a message", ended.err[-2000:])
 
 
-def _judge(deed: Deed, places: Sequence[str]) -> Iterator[Broken]:
-    if deed.event == "socket.connect":
-        if not any(name in deed.about for name in _LOCAL):
-            yield Broken(2, "a connection", deed.about)
-    elif deed.event == "os.mkdir" and any(_lies_in(place, [deed.about]) for place in places):
+def _judge(event: str, about: str, places: Sequence[str]) -> Iterator[Broken]:
+    if event == "socket.connect":
+        if not any(name in about for name in _LOCAL):
+            yield Broken(2, "a connection", about)
+    elif event == "os.mkdir" and any(_lies_in(place, [about]) for place in places):
         return  # that a folder above is there is found out by trying to make it
-    elif not _lies_in(deed.about, [*places, *_DEVICES]):
-        yield Broken(2, f"{deed.event} elsewhere", deed.about)
+    elif not _lies_in(about, [*places, *_DEVICES]):
+        yield Broken(2, f"{event} elsewhere", about)
 
 
 def _lies_in(path: str, places: Sequence[str]) -> bool:
-    return any(
-        place == "." or path == place or path.startswith(place.rstrip("/") + "/")
-        for place in places
-    )
+    return any(place == "." or f"{path}/".startswith(f"{place.rstrip('/')}/") for place in places)
 
 
 def _whole_lines(folder: Path) -> Counter[tuple[str, bytes]]:
     """The whole lines of the files that grow, of every run in the folder."""
     found: Counter[tuple[str, bytes]] = Counter()
     for path in (path for name in _KEPT_FILES for path in folder.glob(f"*/{name}")):
-        if path.is_file():
-            lines = path.read_bytes().split(b"\n")
-            found.update((str(path.relative_to(folder)), line) for line in lines if _is_whole(line))
+        for line in path.read_bytes().split(b"\n") if path.is_file() else ():
+            with contextlib.suppress(ValueError, RecursionError):
+                if isinstance(json.loads(line), dict):
+                    found[str(path.relative_to(folder)), line] += 1
     return found
-
-
-def _is_whole(line: bytes) -> bool:
-    try:
-        return isinstance(json.loads(line), dict)
-    except (ValueError, RecursionError):
-        return False
 
 
 @dataclass(frozen=True)
@@ -243,11 +219,11 @@ class Bench:
 
     def told(self) -> str:
         """Every way in which a law was broken, with the smallest case that does it."""
-        texts = []
+        lines = []
         for name, (case, broken) in self.found.items():
             parts = (f"{key}={value!r}"[:_LONGEST_SHOWN] for key, value in vars(case).items())
-            texts.append("\n".join((name, broken.detail, *parts)))
-        return "\n\n".join(texts)
+            lines += ["", name, broken.detail, *parts]
+        return "\n".join(lines)
 
 
 def _put(path: Path, content: bytes | Fifo | Link) -> None:

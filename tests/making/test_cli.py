@@ -185,7 +185,7 @@ def test_show_prints_the_facts(data):
     told = scenes("show", data, "t3").stdout
     assert "scene t3 · level 3 · 3 blocks · 3 layers" in told
     assert "0 0 75" in told
-    with pytest.raises(DataError, match="no such scene"):
+    with pytest.raises(DataError, match="is not in the data set"):
         scenes("show", data, "t9")
 
 

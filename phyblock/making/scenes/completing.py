@@ -26,7 +26,6 @@ from phyblock.data.scenes import (
     Order,
     Position,
     candidate_set,
-    triple,
 )
 from phyblock.domain.blocks import KIT_PALETTE, Color
 from phyblock.domain.scene import Block, CandidateSet, CycleError, Scene
@@ -45,7 +44,7 @@ class GivenBlock(Line, extra="forbid"):
     type: ShapeName
     color: Color
     position: Position
-    euler: Annotated[Angles, EITHER_NAME] = (0, 0, 0)
+    euler: Annotated[Angles, EITHER_NAME] = (0.0, 0.0, 0.0)
     order: Order | None = None
     layer: Any = None
     depend: Any = None
@@ -122,7 +121,7 @@ def derived(name: str, given: GivenScene, where: str) -> Scene:
         allowed = "a unique order for every block, or for none"
         raise DataError(Problem(where, f"scene {name}: blocks", "order", str(orders), allowed))
     blocks = [
-        Block(order, one.type, one.color, triple(one.position), triple(one.euler), (), 1)
+        Block(order, one.type, one.color, one.position, one.euler, (), 1)
         for order, one in zip(orders or range(1, len(given.blocks) + 1), given.blocks, strict=True)
     ]
     try:
