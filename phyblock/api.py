@@ -57,7 +57,7 @@ from phyblock.run.store import begun, judge_episode, judge_reply
 from phyblock.sim.pictures import PictureStyle, candidates_png, composite_png, goal_png, goal_style
 from phyblock.text import counted, did_you_mean, well_formed
 from phyblock.tracks.base import Track, open_tracks
-from phyblock.tracks.measures import LayoutColumn, Measure, SampleCounts
+from phyblock.tracks.measures import LayoutColumn, Measure, SampleCounts, TrackReport
 from phyblock.tracks.pictures import LocalShop
 from phyblock.types import Background, View
 from phyblock.workers import open_workers
@@ -77,7 +77,13 @@ _MOST_REPEATS = 50
 def checked(function: Callable[_P, _T]) -> Callable[_P, _T]:
     """Decorate a function to raise SpecError for arguments that do not have the declared types."""
     check: Callable[..., _T] = validate_call(config=ConfigDict(strict=True))(function)
-    names = list(inspect.signature(function).parameters)
+    declared = inspect.signature(function).parameters.values()
+    names = [one.name for one in declared if one.kind is not one.KEYWORD_ONLY]
+
+    def named(problem: Problem) -> Problem:
+        """Return the problem with the name of a positional argument in place of its number."""
+        field = re.sub(r"^\[(\d+)\]", lambda at: names[: int(at[1]) + 1][-1], problem.field)
+        return replace(problem, field=field)
 
     @functools.wraps(function)
     def checked(*args: _P.args, **kwargs: _P.kwargs) -> _T:
@@ -87,12 +93,6 @@ def checked(function: Callable[_P, _T]) -> Callable[_P, _T]:
             given: dict[Any, Any] = dict(enumerate(args)) | dict(kwargs)
             problems = problems_of(error, BaseModel, given, function.__name__)
             raise SpecError(map(named, problems)) from None
-
-    def named(problem: Problem) -> Problem:
-        found = re.match(r"\[(\d+)\](.*)", problem.field)
-        if found is None:
-            return problem
-        return replace(problem, field=names[min(int(found[1]), len(names) - 1)] + found[2])
 
     return checked
 
@@ -121,8 +121,8 @@ class Score:
 
     @property
     def measure(self) -> str:
-        """The name of the track's headline measure."""
-        return [*_headline(self.record.track).headings][-1]
+        """The name of the track's headline measure, which models are ranked by."""
+        return [*self._headline.headings][-1]
 
     @property
     def value(self) -> float:
@@ -141,8 +141,7 @@ class Score:
     @property
     def success(self) -> bool:
         """True if everything is right."""
-        name = known_track(self.record.track).report().success or self.measure
-        return self._value(name) == 1.0
+        return self._value(self._report.success or self.measure) == 1.0
 
     @property
     def outcome(self) -> str:
@@ -181,9 +180,18 @@ class Score:
         return {name: getattr(self, name) for name in names}
 
     @property
+    def _report(self) -> TrackReport:
+        return known_track(self.record.track).report()
+
+    @property
+    def _headline(self) -> LayoutColumn:
+        headline = self._report.headline
+        return next((column for column in headline if column.main), headline[-1])
+
+    @property
     def _measures(self) -> dict[str, Measure]:
-        report = known_track(self.record.track).report()
-        return {one.name: one for one in (*report.measures, *added_measures(self.record.track))}
+        added = added_measures(self.record.track)
+        return {one.name: one for one in (*self._report.measures, *added)}
 
     def _value(self, name: str) -> float | None:
         measure = self._measures[name]
@@ -195,15 +203,9 @@ class Score:
     def _numbers(self, counted: SampleCounts) -> Sequence[float] | None:
         if counted.sample is not None:
             return self.record.counts.get(counted.name) or None
-        criterion = _headline(self.record.track).criterion or "aov"
+        criterion = self._headline.criterion or "aov"
         ways = [("", "", ""), *((self.setting, by, criterion) for by in (self.matcher, ""))]
         return next((numbers for way, numbers in counted.of(self.record) if way in ways), None)
-
-
-def _headline(track: str) -> LayoutColumn:
-    """Return the column that models are ranked by."""
-    headline = known_track(track).report().headline
-    return next((column for column in headline if column.main), headline[-1])
 
 
 @dataclass(frozen=True, repr=False)
@@ -517,11 +519,10 @@ def _given(data: Any) -> Dataset:
     dataset = data if isinstance(data, Dataset) else Dataset("data", Path("data"), tuple(data))
     known: set[str] = set()
     for place, one in enumerate(dataset.tasks):
-        field = f"data[{place}]"
-        if not isinstance(one, AssemblyTask):
-            raise SpecError(Problem("tasks", "is not a scene", field, repr(one), allowed))
-        if one.key in known:
-            raise SpecError(Problem("tasks", "comes a second time", field, one.key))
+        is_scene = isinstance(one, AssemblyTask)
+        if not is_scene or one.key in known:
+            message = "comes a second time" if is_scene else "is not a scene"
+            raise SpecError(Problem("tasks", message, f"data[{place}]", repr(one), allowed))
         known.add(one.key)
     return dataset
 
