@@ -20,7 +20,6 @@ from phyblock.records.files import read_records
 from phyblock.records.record import Reply
 from phyblock.sim.engine import ENGINES
 from phyblock.tracks.step_planning import StepPlanning
-from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.tracks.conftest import raw_of, seesaw
 from tests.web.factory import LEVELS, manifest, record, score, write_run
@@ -95,21 +94,6 @@ def is_option(verb, *words):
     inner = command.get_command(context, words[0]) if isinstance(command, click.Group) else None
     known = {name for one in (command, inner) if one for param in one.params for name in param.opts}
     return words[-1] in known | {"--help"}
-
-
-def test_a_call_that_may_cost_is_made_only_where_somebody_agrees(workspace):
-    workspace.write_suite(models=["dear", "free"], seeds=[0], levels=[3])
-    words = ("run", "suite.yaml", "--limit", "1", "--out", "out", "--models")
-    with Running(OpenAIChat()) as running:
-        workspace.write_models(running.url, "dear", price={"input": 1.0, "output": 1.0})
-        refused = workspace.phyblock(*words, "dear", env={"CI": "1"})
-        assert (refused.code, running.server.requests) == (2, 0)
-        assert "would cost money, and there is no terminal to ask on" in refused.err
-        workspace.does(*words, "dear", "--yes")
-        assert running.server.requests == 1
-        workspace.write_models(running.url, "free", price={"input": 0.0, "output": 0.0})
-        workspace.does(*words, "free")
-        assert running.server.requests == 2
 
 
 def test_missing_recordings_and_unknown_providers_are_found(workspace):

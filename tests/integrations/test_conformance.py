@@ -83,17 +83,23 @@ def test_inspect(official_checkout, known, expected):
     check(official_checkout, expected, score)
 
 
-@pytest.mark.parametrize("track", ["full_planning", "step_planning"])
-def test_an_eval_of_inspect(track, tmp_path):
+def log_of_inspect(folder, track, *options):
+    """Return the log of `inspect eval` with a scripted model."""
     pytest.importorskip("inspect_ai", reason="inspect_ai is not installed")
     with Running(OpenAIChat()) as running:
-        call = f"""-m inspect_ai eval phyblock/{track} -T items=4 -T overrides=[images.size_px=128]
+        call = f"""-m inspect_ai eval phyblock/{track} -T overrides=[images.size_px=128]
             --model openai/scripted --model-base-url {running.url}/v1 -M responses_api=false
-            --log-format json --log-dir {tmp_path}"""
+            --log-format json --log-dir {folder}"""
         env = {**os.environ, "OPENAI_API_KEY": "sk-nobody"}
-        subprocess.run([sys.executable, *call.split()], check=True, cwd=tmp_path, env=env)
-    (path,) = tmp_path.glob("*.json")
-    log = json.loads(path.read_text("utf-8"))
+        words = [sys.executable, *call.split(), *options]
+        subprocess.run(words, check=True, cwd=folder, env=env)
+    (path,) = folder.glob("*.json")
+    return json.loads(path.read_text("utf-8"))
+
+
+@pytest.mark.parametrize("track", ["full_planning", "step_planning"])
+def test_an_eval_of_inspect(track, tmp_path):
+    log = log_of_inspect(tmp_path, track, "-T", "items=4")
     found = {one["name"]: one["metrics"] for one in log["results"]["scores"]}
     assert set(found) == {"f1", "success"}
     names = {name.partition("by_part_")[2] for name in found["f1"]}
@@ -120,16 +126,8 @@ def test_arguments_of_inspect(levels, overrides):
 
 
 def test_a_sample_of_inspect_that_a_limit_stops_keeps_its_replies(tmp_path):
-    pytest.importorskip("inspect_ai", reason="inspect_ai is not installed")
-    with Running(OpenAIChat()) as running:
-        call = f"""-m inspect_ai eval phyblock/step_planning -T items=1 --turn-limit 2
-            -T overrides=images.size_px=128 --model openai/scripted
-            --model-base-url {running.url}/v1 -M responses_api=false
-            --log-format json --log-dir {tmp_path}"""
-        env = {**os.environ, "OPENAI_API_KEY": "sk-nobody"}
-        subprocess.run([sys.executable, *call.split()], check=True, cwd=tmp_path, env=env)
-    (path,) = tmp_path.glob("*.json")
-    (sample,) = json.loads(path.read_text("utf-8"))["samples"]
+    log = log_of_inspect(tmp_path, "step_planning", "-T", "items=1", "--turn-limit", "2")
+    (sample,) = log["samples"]
     assert sample["limit"]["type"] == "turn"
     assert len(sample["store"]["replies"]) == 2
     score = sample["scores"]["phyblock_scorer"]
