@@ -52,7 +52,7 @@ from phyblock.registry import added_measures, known_track, known_tracks
 from phyblock.results.load import Run, load_run
 from phyblock.run.estimate import may_bill
 from phyblock.run.plan import check_models, find_models_file, make_plan, read_suite
-from phyblock.run.runner import RunEvent, Session, Stopping, completed, remarks_on
+from phyblock.run.runner import RunEvent, Session, Stopping, completed
 from phyblock.run.store import begun, judge_episode, judge_reply
 from phyblock.sim.pictures import PictureStyle, candidates_png, composite_png, goal_png, goal_style
 from phyblock.text import counted, did_you_mean, well_formed
@@ -635,7 +635,7 @@ def run_suite(
     result = completed(Session(plan, folder, report, **asks))
     if result.stop is not None and result.stop.cause == "interrupted":
         raise KeyboardInterrupt
-    remarks = remarks_on(result, folder)
+    remarks = result.remarks(folder)
     if result.left:
         reason = f" ({result.stop.reason})" if result.stop else ""
         counts = f"{result.left:,} of {counted(result.samples, 'sample')} left{reason}"

@@ -21,14 +21,7 @@ from rich.progress import (
 from rich.text import Text
 
 from phyblock.models.model import ModelEvent
-from phyblock.run.runner import (
-    ModelStopped,
-    RunEvent,
-    RunNotice,
-    RunStarted,
-    SampleDone,
-    Stopping,
-)
+from phyblock.run.runner import RunEvent, RunStarted, SampleDone
 from phyblock.run.store import Summary
 from phyblock.scoring.plan import Counts
 from phyblock.text import counted, one_line
@@ -122,8 +115,8 @@ class ProgressView:
                     tally.add(sample)
         elif isinstance(event, SampleDone):
             self._has_asked = True
-            tally = self._tallies[event.record.model]
-            tally.add(Summary.of(event.record))
+            tally = self._tallies[event.sample.model]
+            tally.add(event.sample)
             self._progress.advance(tally.task.id)
         elif isinstance(event, ModelEvent) and event.kind == "retry":
             self._has_asked = True
@@ -132,15 +125,15 @@ class ProgressView:
             if tally.retries == 1:
                 wait = f"waiting {round(event.wait_s, 1):g} s; more are counted as sent again"
                 self._print(f"{event.model}: {event.message}; {wait}")
-        elif isinstance(event, ModelEvent):
-            self._has_asked = True
-            self._print(f"{event.model}: {event.message}")
-        elif isinstance(event, ModelStopped):
+        elif isinstance(event, ModelEvent) and event.kind == "stopped":
             task = self._tallies[event.model].task
             # Samples that will not be asked are not part of the total.
             self._progress.update(task.id, total=task.completed)
-            self._print(f"{event.model} stopped: {event.reason}", style="red")
-        elif isinstance(event, RunNotice | Stopping):
+            self._print(f"{event.model} stopped: {event.message}", style="red")
+        elif isinstance(event, ModelEvent):
+            self._has_asked |= bool(event.model)
+            self._print(f"{event.model}: {event.message}" if event.model else event.message)
+        else:
             self._print(event.text)
         if not isinstance(event, SampleDone) or self._now() - self._shown_s >= _SHOWN_EVERY_S:
             self.tick()

@@ -56,7 +56,7 @@ from phyblock.run.plan import (
     make_plan,
     read_suite,
 )
-from phyblock.run.runner import RunResult, Session, completed, remarks_on
+from phyblock.run.runner import RunResult, Session, completed
 from phyblock.run.store import held_run
 from phyblock.text import counted, one_line, some_of
 from phyblock.tracks.base import kind_of
@@ -163,7 +163,7 @@ def _is_newest(folder: Path, made: Path) -> bool:
 
 def _conclude(console: Console, folder: Path, result: RunResult, view: ProgressView) -> int:
     """Print the result of a run, its cost and how to continue; return the exit code."""
-    for remark in remarks_on(result, shown_path(folder)):
+    for remark in result.remarks(shown_path(folder)):
         console.print(one_line(remark), style="red")
     done = f"All {result.samples:,} samples are done"
     if result.left:

@@ -107,14 +107,14 @@ class Limits:
 
 @dataclass(frozen=True)
 class ModelEvent:
-    """An event of a model to show to the user, with a safe message.
+    """An event of a model, or of the whole run ("") to show to the user, with a safe message.
 
-    `retry`: a request failed and is sent again after `wait_s`; `notice`: news of a batch, or a
-    server that is not used any more.
+    `retry`: a request failed and is sent again after `wait_s`; `notice`: news of a batch, of the
+    cache, or of a server that is not used any more; `stopped`: the model is not available.
     """
 
     model: str
-    kind: Literal["retry", "notice"]
+    kind: Literal["retry", "notice", "stopped"]
     message: str
     wait_s: float = 0.0
 

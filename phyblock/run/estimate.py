@@ -14,7 +14,7 @@ from phyblock.models.cache import ReplyCache, reply_key
 from phyblock.models.costs import Estimate as CallEstimate
 from phyblock.models.costs import estimate as estimate_call
 from phyblock.models.costs import is_billed, is_free, most_usd, price_at, tariff_of
-from phyblock.models.request import Image, Request
+from phyblock.models.request import Request
 from phyblock.records.files import BatchLines, run_records
 from phyblock.run.plan import RunPlan, Sample
 from phyblock.run.store import held_run
@@ -38,8 +38,7 @@ class Estimate:
     calls: int = 0
     prompt_tokens: int = 0
     reply_tokens: int = 0
-    prompt_usd: float = 0.0
-    reply_usd: float = 0.0
+    _cost_usd: float = 0.0
     _most_usd: float = 0.0
 
     def add_call(self, expected: CallEstimate) -> None:
@@ -51,14 +50,13 @@ class Estimate:
         if self.tariff is not None:
             batched, most = self.model.batch, expected.most_completion_tokens
             price = price_at(self.tariff, batched=batched)
-            self.prompt_usd += prompt * price.input / 1_000_000
-            self.reply_usd += reply * price.output / 1_000_000
+            self._cost_usd += (prompt * price.input + reply * price.output) / 1_000_000
             self._most_usd += most_usd(self.tariff, prompt, most, batched=batched)
 
     @property
     def cost_usd(self) -> float | None:
         """Dollars for the calls."""
-        return None if self.tariff is None else self.prompt_usd + self.reply_usd
+        return None if self.tariff is None else self._cost_usd
 
     @property
     def most_usd(self) -> float | None:
@@ -99,7 +97,8 @@ def estimate(
                 row.done += 1
                 continue
             for outline in outlines if row.model.kind == "litellm" else ():
-                is_known = has_all_pictures(outline)
+                # A picture that is not known yet is empty.
+                is_known = all(picture.data for picture in outline.images)
                 asked = replace(outline, seed=sample.sent_seed, params=row.model.params)
                 key = reply_key(row.model, asked) if is_known else ""
                 if cache is not None and is_known and cache.get(key) is not None:
@@ -109,12 +108,6 @@ def estimate(
                 else:
                     row.add_call(estimate_call(row.model, asked))
     return list(rows.values())
-
-
-def has_all_pictures(outline: Request) -> bool:
-    """True if an outline equals the request to be sent, which has no empty pictures."""
-    parts = (part for message in outline.messages for part in message.parts)
-    return all(part.data for part in parts if isinstance(part, Image))
 
 
 def may_bill(

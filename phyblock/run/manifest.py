@@ -54,16 +54,15 @@ def make_manifest(
     models. `variants` has the tracks of every condition.
     """
     data_version = read_version(dataset.root)
-    known: dict[str, object] = {"name": dataset.name, "sha256": dataset.sha256}
-    if data_version != UNNUMBERED:
-        known["version"] = data_version
-    decisive = [{"name": m.name, **_model(m)} for m in models]
+    data: dict[str, object] = {"name": dataset.name, "sha256": dataset.sha256}
+    numbered = {"version": data_version} if data_version != UNNUMBERED else {}
+    # Models are not part of the identity, but every person has a separate run.
+    people = [model for model in models if model.name.startswith(HUMAN)]
     inputs: dict[str, Any] = {
         "format": FORMAT,
         "suite": suite.identity(),
-        # Models are not part of the identity, but every person has a separate run.
-        "models": [model for model in decisive if str(model["name"]).startswith(HUMAN)],
-        "dataset": known,
+        "models": [{"name": person.name, **person.identity()} for person in people],
+        "dataset": {**data, **numbered},
         "tracks": {track.name: track.identity() for track in variants[Variant()]},
         "limit": limit,
     }
@@ -73,42 +72,40 @@ def make_manifest(
             for variant, of_variant in variants.items()
             if variant == variant.shown
         }
-    identity = hex_digest(json.dumps(inputs, sort_keys=True, separators=(",", ":")))
     libraries = {}
     for name in _LIBRARIES:
         with contextlib.suppress(PackageNotFoundError):
             libraries[name] = version(name)
-    engine = {"engine": described_engine()} if simulating(suite.model_dump()) else {}
-    questions: dict[str, Any] = {}
-    for name, root in suite.files.folders.items():
-        form = getattr(suite, kind_of(name).section).format
-        about = {"format": form, "root": str(root), "version": read_version(root)}
-        questions = questions or {"questions": about}
     fields = {
-        "identity": identity,
+        "identity": hex_digest(json.dumps(inputs, sort_keys=True, separators=(",", ":"))),
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
         **inputs,
         "suite": suite.model_dump(mode="json"),
         "models": [
             {
-                **one,
-                "published": m.published,
-                "size_b": m.size_b,
-                **({"served_at": m.addresses} if m.addresses else {}),
+                "name": model.name,
+                **_model(model),
+                "published": model.published,
+                "size_b": model.size_b,
+                **({"served_at": model.addresses} if model.addresses else {}),
             }
-            for one, m in zip(decisive, models, strict=True)
+            for model in models
         ],
         "dataset": {
-            **known,
+            **data,
             "version": data_version,
             "format": suite.dataset.format,
             "root": str(dataset.root),
         },
-        **engine,
-        **questions,
         **asked_counts(suite, dataset, variants[Variant()]),
         "versions": {"python": platform.python_version(), **libraries, **code_versions()},
     }
+    if simulating(suite.model_dump()):
+        fields["engine"] = described_engine()
+    if suite.files.folders:
+        name, root = next(iter(suite.files.folders.items()))
+        form = getattr(suite, kind_of(name).section).format
+        fields["questions"] = {"format": form, "root": str(root), "version": read_version(root)}
     return Manifest.model_validate(fields)
 
 
@@ -148,24 +145,17 @@ def differences(found: Manifest, wanted: Manifest) -> list[str]:
         if part in old and (part.startswith("models.") or not is_same)
         for key in {**old[part], **new[part]}
         if old[part].get(key) != new[part].get(key)
+        if key not in _LABELS and f"{part}.{key}" not in _NOT_IDENTITY
     ]
     return differ or ([] if is_same else ["how phyblock asks, draws or reads"])
 
 
 def _parts(manifest: Manifest) -> dict[str, dict[str, Any]]:
-    """Return what determines a run's results, by part and name, without digests of pictures."""
+    """Return the fields of a manifest by part and name."""
     fields = manifest.fields()
-    parts = {"suite": {**fields["suite"], "limit": manifest.limit}}
-    parts |= {f"models.{one.name}": one.fields() for one in (*manifest.models, *manifest.others)}
-    parts |= {"dataset": fields.get("dataset") or {}, **manifest.tracks}
-    return {
-        part: {
-            key: value
-            for key, value in about.items()
-            if key not in _LABELS and f"{part}.{key}" not in _NOT_IDENTITY
-        }
-        for part, about in parts.items()
-    }
+    models = {f"models.{one.name}": one.fields() for one in (*manifest.models, *manifest.others)}
+    suite = {**fields["suite"], "limit": manifest.limit}
+    return {"suite": suite, **models, "dataset": fields.get("dataset") or {}, **manifest.tracks}
 
 
 def portable_manifest(manifest: Manifest) -> Manifest:

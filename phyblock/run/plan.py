@@ -143,7 +143,8 @@ def make_plan(
         shown = variants.get(variant.shown)
         variants[variant] = shown or open_tracks(suite.at(variant), dataset, limit, shop)
     tracks = variants[Variant()]
-    _check_models(models, tracks, suite)
+    if problems := list(_conflicts(models, tracks, suite)):
+        raise SpecError(problems)
     if not any(track.items for track in tracks):
         found = f"levels {', '.join(map(str, suite.levels))}; limit {limit or 'none'}"
         have = sorted({level for task in dataset.tasks for level in task.scene.levels})
@@ -158,49 +159,46 @@ def make_plan(
     return RunPlan(suite, models, selected, variants, manifest)
 
 
-def _check_models(models: Sequence[ModelConfig], tracks: Sequence[Track], suite: Suite) -> None:
-    """Raise SpecError unless every model can answer every track and is unambiguous.
+def _conflicts(
+    models: Sequence[ModelConfig], tracks: Sequence[Track], suite: Suite
+) -> Iterator[Problem]:
+    """Yield the reasons why a model cannot answer a track, or is ambiguous.
 
     A recording must match the parser and the candidate numbers of the suite.
     """
-    problems: list[Problem] = []
-
-    def refuse(model: ModelConfig, message: str, field: str, *more: str) -> None:
-        problems.append(Problem(f"model {model.name}", message, field, *more))
-
     for earlier, later in combinations(models, 2):
         is_elsewhere = set(earlier.addresses) != set(later.addresses)
         if is_elsewhere and earlier.identity() == later.identity():
             message = f"is {earlier.name} at another address: they would share their replies"
-            hint = "give one of them a revision, or run one alone"
-            refuse(later, message, "api_base", ", ".join(sorted(later.addresses)), "", hint)
+            found, hint = (
+                ", ".join(sorted(later.addresses)),
+                "give one a revision, or run one alone",
+            )
+            yield Problem(f"model {later.name}", message, "api_base", found, hint=hint)
     for model in models:
-        is_replay = model.kind == "replay"
-        if is_replay and suite.vary.factors:
-            message = "is a recording, which cannot be varied"
-            refuse(model, message, "vary", ", ".join(suite.vary.factors))
+        where, is_replay = f"model {model.name}", model.kind == "replay"
+        if is_replay and (varied := ", ".join(suite.vary.factors)):
+            yield Problem(where, "is a recording, which cannot be varied", "vary", varied)
             continue
         if model.recording is not None:
             for field, was in _recorded_as(model.recording).items():
                 if was != (now := attrgetter(field)(suite)):
-                    refuse(
-                        model, f"is a recording that was made with {field}: {was}", field, now, was
-                    )
+                    message = f"is a recording that was made with {field}: {was}"
+                    yield Problem(where, message, field, now, was)
         for track in tracks:
-            plays, able = track.plays, track_baselines(kind_of(track.name))
+            name, plays, able = track.name, track.plays, track_baselines(kind_of(track.name))
             if is_replay and plays:
-                refuse(model, f"is a recording, which cannot answer in {track.name}", "tracks")
+                message = f"is a recording, which cannot answer in {name}"
+                yield Problem(where, message, "tracks")
             if model.batch and plays:
-                message = f"is asked in batches, and {track.name} plays episodes of several turns"
+                message = f"is asked in batches, and {name} plays episodes of several turns"
                 hint = "each turn waits for the one before: remove batch: true, or the track"
-                refuse(model, message, "batch", track.name, "", hint)
+                yield Problem(where, message, "batch", name, hint=hint)
             if model.kind == "human" and track.by_hand is None:
-                message = f"is a person, who cannot answer in {track.name}"
-                refuse(model, message, "tracks", "", "", f"remove {track.name} from tracks")
+                message = f"is a person, who cannot answer in {name}"
+                yield Problem(where, message, "tracks", hint=f"remove {name} from tracks")
             if model.kind == "baseline" and model.name not in able:
-                refuse(model, f"has no rule for {track.name}", "models", "", ", ".join(able))
-    if problems:
-        raise SpecError(problems)
+                yield Problem(where, f"has no rule for {name}", "models", allowed=", ".join(able))
 
 
 def _recorded_as(folder: Path) -> dict[str, str]:

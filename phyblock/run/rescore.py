@@ -9,7 +9,6 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from functools import partial
 from itertools import takewhile, tee
 from pathlib import Path
 from typing import Any
@@ -51,19 +50,16 @@ def rescore(
     first of their shards writes. Raises StoreError for a folder that is not a run or cannot be
     written, DataError for other data than the run's.
     """
-    manifest = read_manifest(folder)
-    suite = suite_of(manifest, str(folder / MANIFEST))
-    judge = _Judge(folder, manifest, suite, recorded_dataset(folder, manifest, data), strict=False)
-    versions = {**manifest.versions, **code_versions()}
     diverged: Counter[str] = Counter()
     writes = workers is None or workers.shards is None or workers.shards.writes
 
-    def records() -> Iterator[Record]:
+    def records(judge: _Judge) -> Iterator[Record]:
         share = map if workers is None else workers.map
         work: Callable[[tuple[str, Record]], _Judged] = judge
         if workers is not None and not workers.is_here:
-            work = partial(_judge_there, folder.resolve(), None if data is None else data.resolve())
-        lines, stored = tee(run_records(folder, manifest, whole=True))
+            place = None if data is None else data.resolve()
+            work = functools.partial(_judge_there, folder.resolve(), place)
+        lines, stored = tee(run_records(folder, judge.manifest, whole=True))
         for record, again in watch(share(work, lines)):
             where, now = next(stored, (str(folder), None))
             # Answers of an earlier job about this run may be kept in its folder of shards.
@@ -74,13 +70,15 @@ def rescore(
         if writes and next(stored, None) is not None:
             raise StoreError(Problem(str(folder), "has new records", hint=_STALE))
 
-    with contextlib.closing(judge):
+    with contextlib.closing(_Judge(folder, data)) as judge:
         if not writes:
-            for _ in records():
+            for _ in records(judge):
                 pass
             return
+        versions = {**judge.manifest.versions, **code_versions()}
+        manifest = judge.manifest.model_copy(update={"versions": versions})
         with locked(folder):
-            write_run(folder, manifest.model_copy(update={"versions": versions}), records())
+            write_run(folder, manifest, records(judge))
     for name, count in (+diverged).items():
         report(
             f"{kind_of(name).title}: in {counted(count, 'episode')} this version would have asked "
@@ -95,18 +93,15 @@ def judged_again(folder: Path) -> tuple[Manifest, Iterator[Record]]:
     final poses come from the records. Nothing is written. Raises as `rescore`, and StoreError for
     an episode that would take another course.
     """
-    manifest = read_manifest(folder)
-    suite = suite_of(manifest, str(folder / MANIFEST))
-    dataset = recorded_dataset(folder, manifest)
-    judge = _Judge(folder, manifest, suite, dataset, strict=True)
-    changes = asked_counts(suite, _asked_about(manifest, dataset), judge.tracks[""].values())
+    judge = _Judge(folder, strict=True)
 
     def records() -> Iterator[Record]:
         with contextlib.closing(judge):
-            for line in run_records(folder, manifest):
+            for line in run_records(folder, judge.manifest):
                 yield judge(line)[1]
 
-    return manifest.model_copy(update=changes), records()
+    changes = asked_counts(judge.suite, judge.asked, judge.tracks[""].values())
+    return judge.manifest.model_copy(update=changes), records()
 
 
 def recorded_dataset(folder: Path, manifest: Manifest, data: Path | None = None) -> Dataset:
@@ -121,16 +116,15 @@ def recorded_dataset(folder: Path, manifest: Manifest, data: Path | None = None)
     if not root.is_dir():
         raise DataError(Problem(str(root), "the data set of the run is not there", hint=_MOVED))
     dataset = open_dataset(recorded.format, root)
-    digest = _asked_about(manifest, dataset).sha256
+    digest = _asked_about(manifest, suite_of(manifest, str(folder / MANIFEST)), dataset).sha256
     if digest != recorded.sha256:
         raise DataError(Problem(str(root), _CHANGED, "sha256", digest, recorded.sha256, _MOVED))
     return dataset
 
 
-def _asked_about(manifest: Manifest, dataset: Dataset) -> Dataset:
+def _asked_about(manifest: Manifest, suite: Suite, dataset: Dataset) -> Dataset:
     """Return the part of a data set that a run asks about."""
-    tasks = select_tasks(dataset.tasks, suite_of(manifest, MANIFEST), manifest.limit)
-    return replace(dataset, tasks=tasks)
+    return replace(dataset, tasks=select_tasks(dataset.tasks, suite, manifest.limit))
 
 
 def reopen_tracks(
@@ -164,24 +158,22 @@ class _Judge:
     With `strict`, an episode that would take another course is a StoreError.
     """
 
-    def __init__(
-        self, folder: Path, manifest: Manifest, suite: Suite, dataset: Dataset, *, strict: bool
-    ) -> None:
-        conditions = dict.fromkeys(variant.shown for variant in suite.vary.variants)
-        self.tracks = {
-            one.key: {
-                track.name: track
-                for track in reopen_tracks(folder, manifest, suite.at(one), dataset)
-            }
-            for one in conditions
-        }
+    def __init__(self, folder: Path, data: Path | None = None, *, strict: bool = False) -> None:
+        self.manifest = manifest = read_manifest(folder)
+        self.suite = suite = suite_of(manifest, str(folder / MANIFEST))
+        dataset = recorded_dataset(folder, manifest, data)
+        self.asked = _asked_about(manifest, suite, dataset)
+        self.tracks: dict[str, dict[str, Track]] = {}
+        for one in dict.fromkeys(variant.shown for variant in suite.vary.variants):
+            tracks = reopen_tracks(folder, manifest, suite.at(one), dataset)
+            self.tracks[one.key] = {track.name: track for track in tracks}
         self._items = {
             (name, item.key): item for name, one in self.tracks[""].items() for item in one.items
         }
         self._strict = strict
         self._thread = ThreadPoolExecutor(1)  # The thread of a notebook already has a loop.
 
-    def __call__(self, line: tuple[str, Record]) -> tuple[Record, Record]:
+    def __call__(self, line: tuple[str, Record]) -> _Judged:
         """Return the record of a line, as stored and judged again."""
         where, record = line
         track = self.tracks.get(record.way.shown.key, {}).get(record.track)
@@ -202,17 +194,11 @@ class _Judge:
                 track.close()
 
 
-@functools.lru_cache(maxsize=1)
-def _judge_of(folder: Path, data: Path | None) -> _Judge:
-    """Return the judge of a worker process, opened once."""
-    manifest = read_manifest(folder)
-    suite = suite_of(manifest, str(folder / MANIFEST))
-    return _Judge(folder, manifest, suite, recorded_dataset(folder, manifest, data), strict=False)
+_judge_of = functools.lru_cache(maxsize=1)(_Judge)
+"""The judge of a worker process, opened once."""
 
 
-def _judge_there(
-    folder: Path, data: Path | None, line: tuple[str, Record]
-) -> tuple[Record, Record]:
+def _judge_there(folder: Path, data: Path | None, line: tuple[str, Record]) -> _Judged:
     return _judge_of(folder, data)(line)
 
 

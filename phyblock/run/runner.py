@@ -56,24 +56,9 @@ class RunStarted:
 
 @dataclass(frozen=True)
 class SampleDone:
-    """A record was written."""
+    """A record was written; `sample` is its summary."""
 
-    record: Record
-
-
-@dataclass(frozen=True)
-class RunNotice:
-    """A notice about the whole run, such as a disabled cache."""
-
-    text: str
-
-
-@dataclass(frozen=True)
-class ModelStopped:
-    """A model was stopped, because it is not available."""
-
-    model: str
-    reason: str
+    sample: Summary
 
 
 @dataclass(frozen=True)
@@ -95,9 +80,7 @@ class Stopping:
         return f"Stopping: {self.reason}; waiting for {calls} (Ctrl-C again to give them up)."
 
 
-RunEvent = RunStarted | SampleDone | ModelEvent | RunNotice | ModelStopped | Stopping
-Watcher = Callable[[RunEvent], None]
-
+RunEvent = RunStarted | SampleDone | ModelEvent | Stopping
 
 _Result = TypeVar("_Result")
 _LOCAL_AT_ONCE = max(8, os.cpu_count() or 1)
@@ -123,11 +106,23 @@ class RunResult:
         """Number of samples without a final record."""
         return self.samples - self.settled
 
-    def add(self, sample: Record | Summary) -> None:
+    def add(self, sample: Summary) -> None:
         """Count a sample by its record."""
         self.settled += sample.is_final
         self.failed += sample.is_final and not sample.is_answered
         self.unjudged += not sample.is_judged
+
+    def remarks(self, folder: Path | str) -> list[str]:
+        """Return a sentence on each stopped model, and on samples that need attention."""
+        remarks = [f"{model} was stopped: {reason}" for model, reason in self.stopped.items()]
+        if self.failed:
+            rejected = f"{counted(self.failed, 'request')} rejected for good"
+            how = "when the cause is fixed, ask again with --retry-failed, retry_failed=True"
+            remarks.append(f"{rejected}: {how}")
+        if self.unjudged:
+            unjudged = f"{counted(self.unjudged, 'answer')} could not be judged"
+            remarks.append(f"{unjudged}: phyblock score {folder} tries again, without a call")
+        return remarks
 
 
 @dataclass(eq=False)
@@ -136,30 +131,40 @@ class Session:
 
     It asks every model about every sample without a final record; with `retry_failed` also samples
     whose request was rejected for good. `present` are models in this process, by name; others are
-    built. `interrupt` may be called at any time, even before `run`.
+    built.
     """
 
     plan: RunPlan
     folder: Path
-    watch: Watcher
+    watch: Callable[[RunEvent], None]
     use_cache: bool
     retry_failed: bool = False
     present: Mapping[str, Model] = field(default_factory=dict)
-    _models: dict[str, Model] = field(init=False, default_factory=dict)
-    _waiting: set[asyncio.Task[Any]] = field(init=False, default_factory=set)
-    _is_over: bool = field(init=False, default=False)
-    _failure: Exception | None = field(init=False, default=None)
 
     def __post_init__(self) -> None:
-        self.result = RunResult(self.plan.samples_per_model * len(self.plan.models))
-
-    @property
-    def stopping(self) -> bool:
-        """True if no new sample is started."""
-        return self.result.stop is not None
+        names = [model.name for model in self.plan.models]
+        self.result = RunResult(self.plan.samples_per_model * len(names))
+        self._queues: dict[str, deque[Sample]] = {name: deque() for name in names}
+        self._models: dict[str, Model] = {}
+        self._waiting: set[asyncio.Task[Any]] = set()
+        self._failure: Exception | None = None
+        self._whole: tuple[asyncio.AbstractEventLoop, asyncio.Task[Any]] | None = None
+        self._interrupts = 0
 
     def interrupt(self) -> None:
-        """Stop sending requests; safe to call from a signal handler in the loop's thread."""
+        """Stop sending requests; the second time, give up calls in progress too.
+
+        It may be called at any time, in any thread, and by a signal handler.
+        """
+        self._interrupts += 1
+        if self._whole is not None:
+            loop, task = self._whole
+            # Only once, since replies must be written; a closed loop has nothing to stop.
+            heed = task.cancel if self._interrupts == 2 else self._heed
+            with contextlib.suppress(RuntimeError):
+                loop.call_soon_threadsafe(heed)
+
+    def _heed(self) -> None:
         self._stop(Stopping("interrupted", "interrupted"))
 
     async def run(self) -> RunResult:
@@ -169,56 +174,49 @@ class Session:
         the first error of a sample that concerns neither the sample nor its model. A cancellation
         gives up calls in progress.
         """
-        async with AsyncExitStack() as stack:
-            queues = self._open(stack)
-            # An interrupt that came meanwhile is handled before any request.
-            await asyncio.sleep(0)
-            try:
-                await self._ask_all(queues)
-            except BaseException:
-                # If the disk is full, the error that ended the run comes first.
-                with contextlib.suppress(StoreError):
-                    self._note_stopped()
+        task = asyncio.current_task()
+        assert task is not None
+        self._whole = asyncio.get_running_loop(), task
+        try:
+            async with AsyncExitStack() as stack:
+                self._open(stack)
+                await asyncio.sleep(0)
+                if self._interrupts:
+                    self._heed()
+                try:
+                    await self._ask_all()
+                except BaseException:
+                    # If the disk is full, the error that ended the run comes first.
+                    with contextlib.suppress(StoreError):
+                        self._note_stopped()
+                    raise
+                self._note_stopped()
+        except asyncio.CancelledError:
+            if self._interrupts < 2:
                 raise
-            self._note_stopped()
         return self.result
 
-    def _open(self, stack: AsyncExitStack) -> dict[str, deque[Sample]]:
-        """Open store, cache and models until the stack is closed, emit the progress of the run,
-        and return the remaining samples of each model.
+    def _open(self, stack: AsyncExitStack) -> None:
+        """Open store, cache and models until the stack is closed, queue the samples that are left,
+        and emit the progress of the run.
         """
-        plan, result = self.plan, self.result
+        plan, result, limits = self.plan, self.result, self.plan.suite.limits
         stack.callback(plan.close)
-        samples = {model.name: list(plan.samples(model.name)) for model in plan.models}
-        ids = frozenset(sample.id for each in samples.values() for sample in each)
-        self._store = store = stack.enter_context(RunStore(self.folder, plan.manifest, ids))
-        queues: dict[str, deque[Sample]] = {name: deque() for name in samples}
-        earlier: dict[str, list[Summary]] = {name: [] for name in samples}
-        for name, queue in queues.items():
-            for sample in samples[name]:
-                known = store.progress.samples.get(sample.id)
+        self._store = store = RunStore(self.folder, plan.manifest, plan.sample_ids())
+        stack.callback(store.close)
+        progress = store.progress
+        earlier: dict[str, list[Summary]] = {name: [] for name in self._queues}
+        for name, queue in self._queues.items():
+            for sample in plan.samples(name):
+                known = progress.samples.get(sample.id)
                 if known and (known.is_answered if self.retry_failed else known.is_final):
                     earlier[name].append(known)
                     result.add(known)
                 else:
                     queue.append(sample)
-        self._open_models(stack, queues)
-        result.unanswered = store.progress.unanswered_text
-        self.watch(RunStarted(plan.samples_per_model, earlier))
-        if result.unanswered:
-            self.watch(RunNotice(result.unanswered))
-        return queues
-
-    def _open_models(self, stack: AsyncExitStack, queues: Mapping[str, deque[Sample]]) -> None:
-        """Build the models that are not given as `present`."""
-        plan, store, limits = self.plan, self._store, self.plan.suite.limits
-        batches: BatchFiles | None = None
-        if store.progress.batches or any(model.batch for model in plan.models):
-            batches = self._batch_files()
-
         cache: ReplyCache | None = None
         if self.use_cache and any(model.kind == "litellm" for model in plan.models):
-            cache = ReplyCache(reply_cache_file(), lambda text: self.watch(RunNotice(text)))
+            cache = ReplyCache(reply_cache_file(), partial(self._notice, ""))
             stack.callback(cache.close)
         for file in (store.batches, store.calls):
             stack.push_async_callback(file.drain)
@@ -226,7 +224,7 @@ class Session:
             build_model,
             cache=cache,
             overall=asyncio.Semaphore(limits.max_concurrency),
-            budget=Budget(limits.max_cost_usd, sum(store.progress.limit_usd.values())),
+            budget=Budget(limits.max_cost_usd, progress.limit_usd),
             journal=store,
             report=self.watch,
             policy=RetryPolicy(limits.max_attempts, limits.retry_for_s),
@@ -235,41 +233,50 @@ class Session:
             if (present := self.present.get(planned.name)) is not None:
                 model: Model = _Journaled(present, planned, store)
             else:
-                expected = len(queues[planned.name])
-                model = build(planned, batches=batches and replace(batches, expected=expected))
+                model = build(planned, batches=self._batch_files(planned))
             self._models[planned.name] = model
             stack.push_async_callback(model.aclose)
+        result.unanswered = progress.unanswered_text
+        self.watch(RunStarted(plan.samples_per_model, earlier))
+        if result.unanswered:
+            self._notice("", result.unanswered)
 
-    def _batch_files(self) -> BatchFiles:
-        """Return the files of batches. Raises SpecError for a model that has a batch in progress
-        but no longer sets `batch`.
+    def _batch_files(self, model: ModelConfig) -> BatchFiles | None:
+        """Return the files of the batches of a model, if it is asked in batches.
+
+        Raises SpecError if it has a batch in progress, but no longer sets `batch`.
         """
+        lines = tuple(self._store.progress.batches)
+        if not (model.batch or lines):
+            return None
         from phyblock.models.batch import BatchFiles, under_way
 
-        lines = tuple(self._store.progress.batches)
-        message = "has a batch in progress, whose questions would be asked twice"
-        hint = f"let it end with batch: true, or remove its lines from {BATCHES} to give it up"
-        if problems := [
-            Problem(f"model {model.name}", message, "batch", waiting[0].shown, hint=hint)
-            for model in self.plan.models
-            if not model.batch and (waiting := under_way(lines, model.name))
-        ]:
-            raise SpecError(problems)
-        poll_s, recorded = self.plan.suite.limits.batch_poll_s, self._store.progress.samples
-        return BatchFiles(lines, self._store.batches.put, self.folder, poll_s, frozenset(recorded))
+        if model.batch:
+            poll_s, recorded = self.plan.suite.limits.batch_poll_s, self._store.progress.samples
+            put, expected = self._store.batches.put, len(self._queues[model.name])
+            return BatchFiles(lines, put, self.folder, poll_s, recorded, expected)
+        if waiting := under_way(lines, model.name):
+            message = "has a batch in progress, whose questions would be asked twice"
+            hint = f"let it end with batch: true, or remove its lines from {BATCHES} to give it up"
+            where = f"model {model.name}"
+            raise SpecError(Problem(where, message, "batch", waiting[0].shown, hint=hint))
+        return None
+
+    def _notice(self, model: str, text: str) -> None:
+        self.watch(ModelEvent(model, "notice", text))
 
     def _note_stopped(self) -> None:
         result = self.result
         reason = result.stop.reason if result.stop and result.left else ""
         self._store.note_stopped(result.stopped, reason, list(self._models))
 
-    async def _ask_all(self, queues: Mapping[str, deque[Sample]]) -> None:
+    async def _ask_all(self) -> None:
         workers: list[asyncio.Task[None]] = []
         for planned in self.plan.models:
-            queue = queues[planned.name]
-            # Models that answer at once are asked a few at a time, or they would delay calls.
-            is_local = planned.kind in ("baseline", "replay")
-            most = _LOCAL_AT_ONCE if is_local else planned.max_concurrency
+            queue, most = self._queues[planned.name], planned.max_concurrency
+            if planned.kind in ("baseline", "replay"):
+                # Models that answer at once are asked a few at a time, or they would delay calls.
+                most = _LOCAL_AT_ONCE
             # All requests of a batch are asked at once.
             count = len(queue) if planned.batch else min(most, len(queue))
             workers += [asyncio.create_task(self._work(planned, queue)) for _ in range(count)]
@@ -287,7 +294,8 @@ class Session:
 
     async def _end(self, workers: list[asyncio.Task[None]]) -> None:
         """Give up calls in progress, and wait until all replies are on disk."""
-        self._is_over = True
+        for queue in self._queues.values():
+            queue.clear()
         for _ in range(2):
             # Only once, so that a call that has its answer still returns it.
             for worker in workers:
@@ -297,14 +305,15 @@ class Session:
         await self._store.records.drain()
 
     async def _work(self, planned: ModelConfig, queue: deque[Sample]) -> None:
-        """Ask until the queue is empty, or the model or the run is stopped."""
-        while queue and not (self.stopping or self._is_over or planned.name in self.result.stopped):
+        """Ask until the queue is empty; it is emptied when its model or the run is stopped."""
+        while queue:
             try:
                 await self._one(queue.popleft(), planned)
             except UnavailableError as error:
+                queue.clear()
                 if planned.name not in self.result.stopped:
                     self.result.stopped[planned.name] = str(error)
-                    self.watch(ModelStopped(planned.name, str(error)))
+                    self.watch(ModelEvent(planned.name, "stopped", str(error)))
             except BudgetReachedError as error:
                 self._stop(Stopping("cost", str(error)))
             except HaltedError:
@@ -322,6 +331,8 @@ class Session:
     def _stop(self, stop: Stopping) -> None:
         if self.result.stop is None:
             self.result.stop = stop = replace(stop, in_flight=self.under_way)
+            for queue in self._queues.values():
+                queue.clear()
             for task in self._waiting:
                 task.cancel()
             self.watch(stop)
@@ -332,14 +343,14 @@ class Session:
         """
         task, message = asyncio.current_task(), "the run was ended before this request was sent"
         assert task is not None
-        if self.stopping:
+        if self.result.stop is not None:
             work.close()
             raise HaltedError(message)
         self._waiting.add(task)
         try:
             return await work
         except asyncio.CancelledError:
-            if self.stopping:
+            if self.result.stop is not None:
                 raise HaltedError(message) from None
             raise
         finally:
@@ -353,16 +364,15 @@ class Session:
         else:
             record = await self._ask(sample, item, config)
         await self._store.records.put(record)
-        self.result.add(record)
-        self.watch(SampleDone(record))
+        summary = Summary.of(record)
+        self.result.add(summary)
+        self.watch(SampleDone(summary))
 
     async def _ask(self, sample: Sample, item: Item, config: ModelConfig) -> Record:
-        track, model = sample.track, self._models[sample.model]
-        shows = model.needs_messages
+        track, shows = sample.track, self._models[sample.model].needs_messages
         made = track.request(item, sample.sent_seed, config.params, with_messages=shows)
         request = replace(await self._until_stopped(made), sample=sample.id)
-        answer = await self._answer(model, request)
-        fields = self._fields(sample, item, answer, request, config)
+        fields = self._fields(sample, item, await self._answer(request, config), request, config)
         record, is_cancelled = await to_its_end(judge_reply(track, item, fields))
         task = asyncio.current_task()
         if is_cancelled and task is not None:
@@ -371,14 +381,13 @@ class Session:
         return record
 
     async def _play(self, sample: Sample, item: Item, config: ModelConfig) -> Record:
-        track, model = sample.track, self._models[sample.model]
-        shows = model.needs_messages
+        track, shows = sample.track, self._models[sample.model].needs_messages
         episode = track.start(item, sample.sent_seed, config.params, with_messages=shows)
         replies: list[Reply] = []
         fields = self._fields(sample, item, None, None, config)
         while (wanted := await self._until_stopped(episode.request())) is not None:
             request = replace(wanted, sample=sample.id)
-            answer = await self._answer(model, request)
+            answer = await self._answer(request, config)
             fields = self._fields(sample, item, answer, request, config)
             if not isinstance(answer, Reply):
                 break
@@ -386,11 +395,11 @@ class Session:
             episode.take(replies[-1], fields["prompt"])
         return judge_episode(track, item, fields, episode, replies)
 
-    async def _answer(self, model: Model, request: Request) -> Reply | ModelError | None:
+    async def _answer(self, request: Request, config: ModelConfig) -> Reply | ModelError | None:
         """Return the reply, or an error that concerns only this sample."""
         try:
-            return await self._until_stopped(model.ask(request))
-        except (UnavailableError, BudgetReachedError):
+            return await self._until_stopped(self._models[config.name].ask(request))
+        except UnavailableError:
             raise
         except ModelError as error:
             return error
@@ -423,7 +432,8 @@ class _Journaled:
 
     def __init__(self, model: Model, config: ModelConfig, journal: RunStore) -> None:
         self.name = model.name
-        self._model = model
+        self.aclose = model.aclose
+        self._ask = model.ask
         self._config = config
         self._journal = journal
 
@@ -432,15 +442,11 @@ class _Journaled:
         key = reply_key(self._config, request)
         if (kept := self._journal.kept(key)) is not None:
             return kept
-        reply = await self._model.ask(request)
+        reply = await self._ask(request)
         if reply is not None:
             call = await self._journal.sent(self.name, request.sample, key, 0.0)
             await self._journal.ended(call, 0.0, reply)
         return reply
-
-    async def aclose(self) -> None:
-        """Release what the model holds."""
-        await self._model.aclose()
 
 
 async def to_its_end(work: Coroutine[Any, Any, _Result]) -> tuple[_Result, bool]:
@@ -468,62 +474,25 @@ def completed(
 ) -> RunResult:
     """Run a session to its end in a separate thread, since a notebook's thread already has a loop.
 
-    After the first signal it sends nothing more, the second gives up calls in progress; all replies
-    are on disk when this returns. `tick` is called several times a second, with True while calls
-    are in progress.
+    Each of the signals interrupts it; all replies are on disk when this returns. `tick` is called
+    several times a second, with True while calls are in progress.
     """
-    loop, stops = asyncio.new_event_loop(), 0
-    whole: asyncio.Task[RunResult] | None = None
-
-    async def run() -> RunResult:
-        nonlocal whole
-        whole = asyncio.current_task()
-        try:
-            return await session.run()
-        except asyncio.CancelledError:
-            return session.result
-
-    def in_thread() -> RunResult:
-        with asyncio.Runner(loop_factory=lambda: loop) as runner:
-            return runner.run(run())
-
-    def stop(*_: object) -> None:
-        nonlocal stops
-        stops += 1
-        # Only once, since replies must be written; a closed loop has nothing to stop.
-        give_up = whole.cancel if stops == 2 and whole is not None else session.interrupt
-        with contextlib.suppress(RuntimeError):
-            loop.call_soon_threadsafe(give_up)
-
     is_main = threading.current_thread() is threading.main_thread()
     before = {name: signal.getsignal(name) for name in signals if is_main}
     heard = {name: was for name, was in before.items() if was not in (None, signal.SIG_IGN)}
     for name in heard:
-        signal.signal(name, stop)
+        signal.signal(name, lambda *_: session.interrupt())
     try:
         with ThreadPoolExecutor(1) as pool:
-            running = pool.submit(in_thread)
+            running = pool.submit(asyncio.run, session.run())
             try:
                 while not wait((running,), _NAP_S).done:
                     tick(session.under_way > 0)
             except BaseException:
                 # A program's handlers of other signals may raise anything.
-                stop()
+                session.interrupt()
                 raise
         return running.result()
     finally:
         for name, was in heard.items():
             signal.signal(name, was)
-
-
-def remarks_on(result: RunResult, folder: Path | str) -> list[str]:
-    """Return a sentence on each stopped model, and on samples that need attention."""
-    remarks = [f"{model} was stopped: {reason}" for model, reason in result.stopped.items()]
-    if result.failed:
-        rejected = f"{counted(result.failed, 'request')} rejected for good"
-        how = "when the cause is fixed, ask again with --retry-failed, retry_failed=True"
-        remarks.append(f"{rejected}: {how}")
-    if result.unjudged:
-        unjudged = f"{counted(result.unjudged, 'answer')} could not be judged"
-        remarks.append(f"{unjudged}: phyblock score {folder} tries again, without a call")
-    return remarks

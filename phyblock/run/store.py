@@ -13,15 +13,13 @@ import fcntl
 import json
 import os
 import re
-import threading
-from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from io import FileIO
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from phyblock.config.yaml import dump_yaml
 from phyblock.errors import (
@@ -68,12 +66,11 @@ from phyblock.records.record import (
 )
 from phyblock.run.manifest import code_versions, differences
 from phyblock.scoring.plan import Counts
-from phyblock.text import counted, hex_digest, plain_sum, well_formed
+from phyblock.text import counted, hex_digest, plain_sum, some_of, well_formed
 from phyblock.tracks.base import Episode, Item, Judgement, Track
 from phyblock.types import Outcome
 
 LineT = TypeVar("LineT", bound=Line)
-_N = TypeVar("_N", int, float)
 
 _HEADLINE = "aov"
 _OTHER_FOLDER = "choose another folder with --out"
@@ -81,16 +78,12 @@ _APPENDING = "free some space and run the same command again to continue"
 
 
 class AppendFile:
-    """Lines that are on disk when `append` or `put` returns; safe to call from several threads.
-
-    The file is created with the first line.
-    """
+    """Lines that are on disk when `append` or `put` returns; created with the first line."""
 
     def __init__(self, path: Path, *, sync: bool = True) -> None:
         """Without `sync`, lines survive a crash of the process, but not of the machine."""
         self._path = path
         self._sync = sync
-        self._writing = threading.Lock()
         self._file: FileIO | None = None
         self._size_bytes = 0
         self._waiting: list[tuple[Line, asyncio.Future[None]]] = []
@@ -103,14 +96,14 @@ class AppendFile:
         file meanwhile; earlier lines stay whole.
         """
         data = "".join(f"{_json_line(line)}\n" for line in lines).encode("utf-8", "replace")
-        with self._writing, writing(self._path, _APPENDING):
+        with writing(self._path, _APPENDING):
             if self._file is None:
                 # Unbuffered: a failed write must not be repeated implicitly.
                 self._file = FileIO(self._path, "a")
                 self._size_bytes = os.fstat(self._file.fileno()).st_size
                 if self._sync:
                     sync_folder(self._path.parent)
-            self._check(self._file.fileno())
+            self.check()
             append_whole(self._file.fileno(), data, sync=self._sync)
             self._size_bytes += len(data)
 
@@ -125,24 +118,6 @@ class AppendFile:
         if self._flusher is None:
             self._flusher = asyncio.create_task(self._flush())
         await written
-
-    async def drain(self) -> None:
-        """Wait until everything that was put is on disk or has failed."""
-        if self._flusher is not None:
-            await self._flusher
-
-    def check(self) -> None:
-        """Raise StoreError unless the file that was written is the one at its path, and whole."""
-        with self._writing:
-            if self._file is not None:
-                self._check(self._file.fileno())
-
-    def close(self) -> None:
-        """Close the file after pending writes."""
-        with self._writing:
-            if self._file is not None:
-                self._file.close()
-                self._file = None
 
     async def _flush(self) -> None:
         while self._waiting:
@@ -161,8 +136,16 @@ class AppendFile:
                     written.set_exception(failure)
         self._flusher = None
 
-    def _check(self, number: int) -> None:
-        opened = os.fstat(number)
+    async def drain(self) -> None:
+        """Wait until everything that was put is on disk or has failed."""
+        if self._flusher is not None:
+            await self._flusher
+
+    def check(self) -> None:
+        """Raise StoreError unless the file that was written is the one at its path, and whole."""
+        if self._file is None:
+            return
+        opened = os.fstat(self._file.fileno())
         try:
             is_same = os.path.samestat(opened, os.stat(self._path))
         except FileNotFoundError:
@@ -171,6 +154,12 @@ class AppendFile:
             message = "was removed, replaced or changed while the run was writing it"
             hint = f"restore it from a copy; replies that have arrived are in {CALLS}"
             raise StoreError(Problem(str(self._path), message, hint=hint))
+
+    def close(self) -> None:
+        """Close the file, once everything that was put is written."""
+        if self._file is not None:
+            self._file.close()
+            self._file = None
 
 
 def begun(
@@ -220,7 +209,7 @@ def judge_episode(
     judgement = episode.judgement()
     if replies:
         first = judgement.fields["turns"][0]["prompt"]
-        fields = {**fields, "reply": pooled(replies).storable(), "prompt": first}
+        fields = {**fields, "reply": _pooled(replies).storable(), "prompt": first}
     return judged(track, item, fields, judgement)
 
 
@@ -269,21 +258,23 @@ def _error(error: ModelError) -> StoredError:
     return StoredError(kind=kind, status=error.status, message=message, billed_usd=billed_usd)
 
 
-def pooled(replies: Sequence[Reply]) -> Reply:
+def _pooled(replies: Sequence[Reply]) -> Reply:
     """Return the sum of an episode's replies, with the text of the last one.
 
-    It counts as truncated or refused only if all of them are.
+    It counts as truncated or refused only if all of them are; a sum is unknown if any part is.
     """
-    counts = {
-        name: _sum(getattr(reply.usage, name) for reply in replies) for name in Usage.model_fields
-    }
+
+    def total(values: list[Any]) -> Any:
+        return None if None in values else plain_sum(values)
+
     billed = [reply.billed_usd for reply in replies if reply.billed_usd is not None]
     ends = {reply.finish for reply in replies}
+    usages = [reply.usage for reply in replies]
     return Reply(
         text=replies[-1].text,
         finish=ends.pop() if len(ends) == 1 else "stop",
-        usage=Usage(**counts),
-        cost_usd=_sum(reply.cost_usd for reply in replies),
+        usage=Usage(**{n: total([getattr(one, n) for one in usages]) for n in Usage.model_fields}),
+        cost_usd=total([reply.cost_usd for reply in replies]),
         billed_usd=plain_sum(billed) if billed else None,
         latency_s=plain_sum(reply.latency_s for reply in replies),
         provider_model=replies[-1].provider_model,
@@ -293,15 +284,7 @@ def pooled(replies: Sequence[Reply]) -> Reply:
     )
 
 
-def _sum(values: Iterable[_N | None]) -> _N | None:
-    """Return the sum, or None if any value is unknown."""
-    found = list(values)
-    known = [value for value in found if value is not None]
-    return plain_sum(known) if known and len(known) == len(found) else None
-
-
-@dataclass(frozen=True, slots=True)
-class Summary:
+class Summary(NamedTuple):
     """The part of a record that live progress needs; `counts` are of the headline matcher and
     setting.
 
@@ -321,17 +304,11 @@ class Summary:
     def of(cls, record: Record) -> Summary:
         """Return the summary of a record."""
         headline = next((s for s in record.scores if s.criterion == _HEADLINE), None)
-        reply = record.reply
-        return cls(
-            record.model,
-            record.outcome,
-            record.is_answered,
-            record.is_final,
-            record.is_judged,
-            None if headline is None else Counts(headline.tp, headline.fp, headline.fn),
-            None if reply is None else reply.cached,
-            record.paid_usd,
-        )
+        counts = None if headline is None else Counts(headline.tp, headline.fp, headline.fn)
+        cached = None if record.reply is None else record.reply.cached
+        is_final, is_judged = record.is_final, record.is_judged
+        known = record.model, record.outcome, record.is_answered, is_final, is_judged
+        return cls(*known, counts, cached, record.paid_usd)
 
 
 @dataclass
@@ -348,13 +325,14 @@ class Progress:
     calls: int = 0
     replies: dict[str, Reply] = field(default_factory=dict)
     unanswered: dict[int, Call] = field(default_factory=dict)
-    _calls_usd: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
-    _records_usd: defaultdict[str, float] = field(default_factory=lambda: defaultdict(float))
+    _calls_usd: float = 0.0
+    _records_usd: dict[str, float] = field(default_factory=dict)
 
     def add(self, record: Record) -> None:
         """Add a record; records come oldest first."""
-        self.samples[record.sample] = Summary.of(record)
-        self._records_usd[record.sample] += record.limit_usd
+        name = record.sample
+        self.samples[name] = Summary.of(record)
+        self._records_usd[name] = self._records_usd.get(name, 0.0) + record.limit_usd
 
     def add_call(self, call: Call) -> None:
         """Add a line about a call, oldest first, after all records."""
@@ -365,20 +343,16 @@ class Progress:
             self.unanswered[call.call] = call
             return
         self.unanswered.pop(call.call, None)
-        self._calls_usd[call.model] += call.billed_usd or 0.0
+        self._calls_usd += call.billed_usd or 0.0
         sample = self.samples.get(call.sample)
         if call.reply is not None and not (sample and sample.is_final):
             self.replies[call.key] = call.reply
 
     @property
-    def limit_usd(self) -> dict[str, float]:
-        """Return the cost that a limit counts, by model [US dollars]; unknown ones in full."""
-        usd = self._calls_usd.copy()
-        for call in self.unanswered.values():
-            usd[call.model] += call.most_usd or 0.0
-        for sample, cost_usd in self._records_usd.items():
-            usd[self.samples[sample].model] += cost_usd
-        return usd
+    def limit_usd(self) -> float:
+        """Return the cost that a limit counts [US dollars]; calls without a known end in full."""
+        most = (call.most_usd or 0.0 for call in self.unanswered.values())
+        return plain_sum((self._calls_usd, *most, *self._records_usd.values()))
 
     @property
     def unanswered_text(self) -> str:
@@ -430,12 +404,6 @@ class RunStore:
             self.close()
             raise
 
-    def __enter__(self) -> RunStore:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
     def close(self) -> None:
         """Release the files and the lock after pending writes."""
         self._open.close()
@@ -478,10 +446,8 @@ class RunStore:
             self._prompts_known.add(digest)
             self._prompts.append([{"sha256": digest, "messages": fields}])
         images = tuple(
-            SentImage(
-                label=one.label, sha256=one.sha256, width_px=one.width_px, height_px=one.height_px
-            )
-            for one in request.images
+            SentImage(**{name: getattr(image, name) for name in SentImage.model_fields})
+            for image in request.images
         )
         version = request.prompt_version
         return SentPrompt(template=template, version=version, messages=digest, images=images)
@@ -591,31 +557,27 @@ def check_place(folder: Path) -> None:
     """
     with writing(folder, _OTHER_FOLDER):
         try:
-            os.lstat(folder)
+            names = sorted(os.listdir(folder))
         except FileNotFoundError:
             return
-        names = {entry.name for entry in os.scandir(folder)}
-    strangers = sorted(name for name in names if not _BEGUN.fullmatch(name))
+    strangers = [name for name in names if not _BEGUN.fullmatch(name)]
     if MANIFEST not in names and strangers:
-        found = ", ".join(strangers[:3]) + (", ..." if len(strangers) > 3 else "")
         message = f"is not empty and holds no run (no {MANIFEST})"
         hint = "name a new or an empty folder with --out"
-        raise StoreError(Problem(str(folder), message, found=found, hint=hint))
+        raise StoreError(Problem(str(folder), message, found=some_of(strangers), hint=hint))
     if links := [folder / name for name in _OWN if (folder / name).is_symlink()]:
         message = "is a link, and a run writes only in its own folder"
         raise StoreError([Problem(str(path), message, hint=_OTHER_FOLDER) for path in links])
 
 
 def write_run(folder: Path, manifest: Manifest, records: Iterable[Record]) -> None:
-    """Write manifest and records of a run. Raises StoreError if the disk fails."""
+    """Replace manifest and records of a run. Raises StoreError if the disk fails."""
     lines = (line.encode("utf-8", "replace") for line in record_lines(records))
-    files: dict[str, str | Iterator[bytes]] = {RECORDS: lines, MANIFEST: manifest_text(manifest)}
-    # A kill between the two writes leaves a run that has to be rescored.
-    names = (RECORDS, MANIFEST) if (folder / MANIFEST).exists() else (MANIFEST, RECORDS)
     OutFolder(folder).claim([])
-    for name in names:
+    # A kill between the two leaves a run that has to be rescored.
+    for name, data in ((RECORDS, lines), (MANIFEST, manifest_text(manifest))):
         with writing(folder / name):
-            atomic_write(folder / name, files[name], sync=True)
+            atomic_write(folder / name, data, sync=True)
 
 
 def manifest_text(manifest: Manifest) -> str:

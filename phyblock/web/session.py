@@ -216,8 +216,8 @@ class PlaySession:
                 if self.done < self._of:
                     self.welcome(person.name)
                 opened()
-            elif isinstance(event, SampleDone) and event.record.model == person.model:
-                self.done += event.record.is_final
+            elif isinstance(event, SampleDone) and event.sample.model == person.model:
+                self.done += event.sample.is_final
                 self._turns = 0
 
         model, loop = PersonModel(person.model, plan, self), asyncio.get_running_loop()

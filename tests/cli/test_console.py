@@ -17,7 +17,8 @@ from phyblock.results.export import write_csv
 from phyblock.results.load import load_run
 from phyblock.results.tables import write_tables
 from phyblock.results.text import Column, TextTable
-from phyblock.run.runner import ModelStopped, RunNotice, RunStarted, SampleDone
+from phyblock.run.runner import RunStarted, SampleDone
+from phyblock.run.store import Summary
 from tests.web.factory import LEVELS, manifest, record, score, write_run
 
 NAME = ":b: [red]x[/red]\n=2 \x1b[31m\u202e|&\r"
@@ -69,7 +70,7 @@ def test_tables_show_names_as_they_are():
     view = ProgressView(console)
     view(RunStarted(1, {NAME: ()}))
     console.print(view._progress.make_tasks_table(view._progress.tasks))
-    view(ModelStopped(NAME, NAME))
+    view(ModelEvent(NAME, "stopped", NAME))
     shown = console.file.getvalue()
     assert shown.count(SHOWN) == 7
     assert "\x1b" not in shown
@@ -104,7 +105,8 @@ def retry(status=429, wait_s=1.0, model="alpha"):
 
 
 def done(model="alpha", outcome="ok"):
-    return SampleDone(known_records().validate_python(record(model=model, outcome=outcome)))
+    line = known_records().validate_python(record(model=model, outcome=outcome))
+    return SampleDone(Summary.of(line))
 
 
 def logged(*events, models=("alpha",), expected=10):
@@ -122,10 +124,10 @@ def logged(*events, models=("alpha",), expected=10):
 def test_a_log_tells_of_retries_servers_failures_and_models_that_are_stopped():
     lines = logged(
         (0.0, retry()),
-        (1.0, RunNotice("http://host:1 cannot be reached [x] :b: no connection")),
+        (1.0, ModelEvent("", "notice", "http://host:1 cannot be reached [x] :b: no connection")),
         (2.0, retry(None, 9.0)),
         (11.0, done(outcome="api_error")),
-        (12.0, ModelStopped("alpha", "HTTP 401: no")),
+        (12.0, ModelEvent("alpha", "stopped", "HTTP 401: no")),
         (21.5, retry()),
     )
     assert lines == [

@@ -16,7 +16,6 @@ from phyblock.domain.scene import AssemblyTask, Block, Candidate, CandidateSet, 
 from phyblock.models.request import Image
 from phyblock.parsing.move import MOVE_PROBLEMS
 from phyblock.records.record import Reply
-from phyblock.run.estimate import has_all_pictures
 from phyblock.scoring.steps import MOVE_OUTCOMES
 from phyblock.tracks.pictures import Workshop
 from phyblock.tracks.step_planning import ENDINGS, STEP_RULES, Feedback, PastStep
@@ -311,7 +310,7 @@ def test_pictures_of_states_are_drawn_and_kept(tmp_path):
         found.append(asyncio.run(play(track, task)))
         assert shop.rendered == expected
         outlines = list(track.outlines(task))
-        are_real = [has_all_pictures(outline) for outline in outlines]
+        are_real = [all(one.data for one in outline.images) for outline in outlines]
         assert are_real == [True] + [False] * (len(outlines) - 1)
         track.close()
     assert found[0] == found[1]

@@ -1,0 +1,1 @@
+"""The commands `phyblock scenes ...` and `phyblock questions ...`, one module each."""
