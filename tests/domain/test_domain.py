@@ -143,25 +143,19 @@ def test_sizes_are_those_of_the_kit(block_type):
 SEEDS = st.integers(0, 2**32 - 1)
 
 
-def masks(graph):
-    return st.integers(0, (1 << len(graph)) - 1)
-
-
-@given(edges=acyclic())
-def test_a_layer_is_one_above_the_highest_that_carries_it(edges):
-    graph = AOVGraph(edges)
+@given(edges=acyclic(), seed=SEEDS, data=st.data())
+def test_layers_ready_blocks_and_random_orders_follow_the_dependencies(edges, seed, data):
+    graph, n = AOVGraph(edges), len(edges)
     for vertex, needed in enumerate(edges):
         assert graph.layers[vertex] == 1 + max((graph.layers[w] for w in needed), default=0)
-
-
-@given(edges=acyclic(), data=st.data())
-def test_ready_is_what_is_unplaced_and_wholly_carried(edges, data):
-    graph = AOVGraph(edges)
-    placed = data.draw(masks(graph))
-    inside = {v for v in range(len(graph)) if placed & 1 << v}
-    expected = [v for v in range(len(graph)) if v not in inside and edges[v] <= inside]
+    placed = data.draw(st.integers(0, (1 << n) - 1))
+    inside = {v for v in range(n) if placed & 1 << v}
+    expected = [v for v in range(n) if v not in inside and edges[v] <= inside]
     assert list(graph.ready(placed)) == expected
-    assert [v for v in range(len(graph)) if graph.is_ready(v, placed)] == expected
+    assert [v for v in range(n) if graph.is_ready(v, placed)] == expected
+    order = graph.random_order(np.random.default_rng(seed))
+    assert graph.is_valid(order)
+    assert order == graph.random_order(np.random.default_rng(seed))
 
 
 @given(edges=acyclic(max_size=5), data=st.data())
@@ -174,14 +168,6 @@ def test_valid_orders_are_the_permutations_that_respect_every_dependency(edges, 
         assert graph.is_valid(order) == (
             is_whole and all(at[w] < at[v] for v, needed in enumerate(edges) for w in needed)
         )
-
-
-@given(edges=acyclic(), seed=SEEDS)
-def test_a_random_order_is_valid_and_set_by_its_seed(edges, seed):
-    graph = AOVGraph(edges)
-    order = graph.random_order(np.random.default_rng(seed))
-    assert graph.is_valid(order)
-    assert order == graph.random_order(np.random.default_rng(seed))
 
 
 def test_random_orders_reach_every_order():

@@ -45,6 +45,7 @@ SAID = {
 }
 HERE = Path(__file__).parent
 TABLE = yaml.safe_load((HERE / "replies.yaml").read_text(encoding="utf-8"))
+AROUND = TABLE.pop("around a plan")
 ROWS = [
     (reader, said, text)
     for reader, rows in TABLE.items()
@@ -61,25 +62,9 @@ def test_a_reply_is_read_as_it_says_or_has_a_named_problem(reader, said, text):
 
 PLAN = (7, 7, 12, 3, 5, 9, 14, 2, 1)
 TEXT = plan_text(*PLAN)
-HARMLESS = [
-    "The structure is built in three layers with a total of 9 blocks.",
-    "I chose block 12 because block 9 has its roof facing the wrong way.",
-    "Note: 14 and 16 are mirrored.",
-    "This places 9 blocks (8 blocks in the tower).",
-    "Steps 7 and 8 could be reversed.",
-    "To take it down, go in reverse order.",
-    "Seen from behind the order would be reversed.",
-    "Blocks 4, 6 and 8 are not used.",
-    "1. The base is stable.\n2. Block 3 rests on block 12.",
-    "- Step 3 needs block 12 on the floor.",
-    "| Block | Used |\n|---|---|\n| 4 | no |",
-    "Correction: in step 4 it should be block 14.",
-    "```\nheight: 3\n```",
-    "Alternatively block 15 could replace block 14, but I am not sure.",
-]
 
 
-@pytest.mark.parametrize("text", HARMLESS)
+@pytest.mark.parametrize("text", AROUND)
 def test_what_stands_around_a_plan_changes_nothing(text):
     for whole in (f"{TEXT}\n\n{text}", f"{text}\n\n{TEXT}", f"{text}\n\n{TEXT}\n\n{text}"):
         assert parse_plan(whole, N).plan.steps == PLAN

@@ -185,6 +185,10 @@ def test_a_plank_rests_on_both_its_posts_and_nothing_under_the_arch():
     assert graph[3] == {1, 2}
     assert graph[4] == {3}
     assert graph[5] == {3}
+    # An edge on a face carries; on its border it counts where there is nothing else.
+    for y in (0.0, 0.025):
+        edge = block(2, "triangle", (0.0, y, 0.05 + 0.05 / 2**0.5), (180.0, 0.0, 0.0))
+        assert support_graph([*tower(1), edge])[2] == {1}
 
 
 @pytest.mark.slow

@@ -56,7 +56,7 @@ from phyblock.sim.question_pictures import (
 from phyblock.sim.ruled import kit_key, ruled_key
 from phyblock.types import BACKGROUNDS
 from tests.shipped import TASKS, built_in_questions
-from tests.sim.structures import block, clouds, designed_scene, scene_of, tower
+from tests.sim.structures import block, clouds, scene_of, tower
 
 TASK = TASKS[0]
 STYLE, SMALL = PictureStyle(), PictureStyle(size_px=128)
@@ -201,7 +201,7 @@ def test_every_face_stands_out_from_the_floor(background, color):
 
 
 def test_keys_name_the_content_and_not_the_scene():
-    scene, other = designed_scene("l1-gate"), designed_scene("l1-dog")
+    scene, other = (task.scene for task in TASKS[:2])
     assert goal_key(scene, SMALL) == goal_key(replace(scene, id="another", levels=(4,)), SMALL)
     first = replace(scene.blocks[0], euler_deg=(0.0, 0.0, 90.0))
     turned = replace(scene, blocks=(first, *scene.blocks[1:]))
@@ -314,7 +314,7 @@ def test_all_that_is_ruled_and_written_is_in_the_picture(places, azimuth_deg, el
 
 
 def test_an_animation_ends_in_the_goal_and_blocks_are_placed_in_order():
-    scene = designed_scene("l2-rocket")
+    scene = TASK.scene
     with Image.open(io.BytesIO(assembly_gif(scene, SMALL))) as image:
         assert (image.n_frames, image.info["loop"]) == (len(scene), 0)
         *_, last = (np.asarray(one.convert("RGB")) for one in ImageSequence.Iterator(image))

@@ -28,6 +28,8 @@ _FLAGS = [
     *("--use-angle=swiftshader", "--enable-unsafe-swiftshader"),
 ]
 _CHROMIUMS = ("chromium", "chromium-browser", "google-chrome")
+LOOK = Path(__file__).with_name("page.js").read_text(encoding="utf-8").strip()
+"""An object of functions that look at a page, as an expression."""
 
 
 def expect(locator: Locator) -> LocatorAssertions:
@@ -126,18 +128,24 @@ class PageVisit(Visit):
 
 @pytest.fixture(scope="session")
 def made(new_workspace: Callable[..., Workspace]) -> Workspace:
-    """A run, with its report, of two baselines on five scenes and six questions, two seeds each.
+    """A run, with its report, of two baselines on five scenes and six questions, two seeds each, in
+    four tracks; `later.zip` is a bundle of two in one of them.
 
     One reply says `HOSTILE`, one plans 9, 3; one is missing. No test changes it.
     """
     made = new_workspace()
     write_questions(made.root / "questions", questions(per_subtask=2, subtasks=SUBTASKS))
+    made.write_suite(name="later", models=["random", "all-candidates"], seeds=[0, 1])
+    made.out = made.root / "later"
+    made.completed()
+    made.does("bundle", "later", "--out", "later.zip")
     made.write_suite(
-        tracks=["full_planning", "vqa", "step_planning"],
+        tracks=["full_planning", "vqa", "step_planning", "pose_planning"],
         vqa={"path": "./questions", "subtasks": list(SUBTASKS)},
         steps={"physics": "off"},
         seeds=[0, 1],
     )
+    made.out = made.root / "first"
     made.completed()
     path = made.out / "records.jsonl"
     lines = read_lines(path)
@@ -178,44 +186,26 @@ def troubled(new_workspace: Callable[..., Workspace]) -> Workspace:
 
 
 @pytest.fixture(scope="session")
-def runs(new_workspace: Callable[..., Workspace]) -> Workspace:
-    """`first`: two baselines in four tracks; `later.zip`: a bundle of two in one of them."""
-    made = new_workspace()
-    write_questions(made.root / "questions", questions(per_subtask=2, subtasks=["SH", "OR"]))
-    fields = {"vqa": {"path": "./questions", "subtasks": ["SH", "OR"]}, "seeds": [0]}
-    tracks = ["full_planning", "vqa", "step_planning", "pose_planning"]
-    made.write_suite(tracks=tracks, steps={"physics": "off"}, **fields)
-    made.out = made.root / "first"
-    made.completed()
-    made.write_suite(name="later", models=["random", "all-candidates"], seeds=[0, 1])
-    made.out = made.root / "later"
-    made.completed()
-    made.does("bundle", "later", "--out", "later.zip")
-    return made
-
-
-@pytest.fixture(scope="session")
-def site(runs: Workspace) -> Path:
+def site(made: Workspace) -> Path:
     """The page of a site of a bundle and a run whose model `random` and scene `t3` are `NAME`."""
-    source, folder = runs.root / "first", runs.root / "hostile"
+    folder = made.root / "hostile"
     folder.mkdir()
-    manifest = (source / "run.yaml").read_text(encoding="utf-8")
+    manifest = (made.out / "run.yaml").read_text(encoding="utf-8")
     renamed = manifest.replace("name: random", f'name: "{json.dumps(NAME)[1:-1]}"')
     (folder / "run.yaml").write_text(renamed, encoding="utf-8")
-    lines = read_lines(source / "records.jsonl")
+    lines = made.records()
     for record in lines:
-        hostile = {"random": NAME, "t3": NAME}
         for field in ("model", "key", "scene"):
-            record[field] = hostile.get(record[field], record[field])
+            record[field] = NAME if record[field] in ("random", "t3") else record[field]
         record["sample"] = f"{record['track']}/{record['model']}/{record['key']}/s{record['seed']}"
-        if record["model"] == NAME:
+        if record["model"] == NAME and record["reply"]:
             record["reply"]["text"] = record["reply"]["reasoning"] = HOSTILE
     write_lines(folder / "records.jsonl", lines)
     data = ("--data", "data", "--data", "questions")
     named = ("--title", f"A site {NAME}", "--out", "site")
-    done = runs.does("site", "hostile", "later.zip", *data, *named)
-    assert "4 models and baselines, 58 samples" in done.out
-    return runs.root / "site" / "index.html"
+    done = made.does("site", "hostile", "later.zip", *data, *named)
+    assert "4 models and baselines, 104 samples" in done.out
+    return made.root / "site" / "index.html"
 
 
 @pytest.fixture(scope="module")
@@ -255,8 +245,3 @@ def visit(visiting: Callable[..., PageVisit], made: Workspace) -> PageVisit:
 @pytest.fixture
 def trouble(visiting: Callable[..., PageVisit], troubled: Workspace) -> PageVisit:
     return visiting(troubled.out / "report.html")
-
-
-@pytest.fixture
-def site_visit(visiting: Callable[..., PageVisit], site: Path) -> PageVisit:
-    return visiting(site)

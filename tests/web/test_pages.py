@@ -9,81 +9,18 @@ import yaml
 from phyblock.results.tables import write_tables
 from phyblock.scoring.plan import ERROR_TYPES
 from phyblock.web.report import write_report
-from tests.web.conftest import HOSTILE, NAME, expect
+from tests.web.conftest import HOSTILE, LOOK, NAME, expect
 from tests.web.factory import manifest, write_run
 
-PHONE = {"width": 390, "height": 844}
 WIDE = "document.documentElement.scrollWidth <= innerWidth"
 
 
 def painted(page, selector):
     """Return the number of pixels of a canvas that are drawn."""
-    script = """canvas => {
-        const copy = new OffscreenCanvas(canvas.width, canvas.height);
-        const context = copy.getContext("2d", { willReadFrequently: true });
-        context.drawImage(canvas, 0, 0);
-        const { data } = context.getImageData(0, 0, canvas.width, canvas.height);
-        return new Uint32Array(data.buffer).filter(pixel => pixel >>> 24).length;
-    }"""
-    return page.eval_on_selector(selector, script)
+    return page.eval_on_selector(selector, f"canvas => {LOOK}.painted(canvas)")
 
 
-STRUCTURE = """() => {
-  const seen = (one) => one.checkVisibility();
-  const all = (selector) => [...document.querySelectorAll(selector)].filter(seen);
-  const named = (one) => one.getAttribute("aria-label") || one.getAttribute("alt")
-    || one.textContent.trim() || one.labels?.[0]?.textContent.trim()
-    || one.querySelector("img")?.alt;
-  const levels = all("h1, h2, h3, h4").map((one) => Number(one.tagName[1]));
-  const ids = [...document.querySelectorAll("[id]")].map((one) => one.id);
-  const refer = ["aria-controls", "aria-labelledby", "aria-activedescendant"];
-  const within = "a[tabindex='0'], button, a:not([tabindex])";
-  return {
-    nameless: all("a, button, input, select, summary, img, [role=img]")
-      .filter((one) => !named(one)).map((one) => one.outerHTML.slice(0, 80)),
-    h1: levels.filter((level) => level === 1).length,
-    jumps: levels.filter((level, i) => i && level > levels[i - 1] + 1),
-    twice: ids.filter((id, i) => ids.indexOf(id) !== i),
-    lost: refer.flatMap((name) => all(`[${name}]`).map((one) => one.getAttribute(name)))
-      .filter((id) => !document.getElementById(id)),
-    unreached: all("*").filter((one) => {
-      const { overflowX, overflowY } = getComputedStyle(one);
-      const isLarger = one.scrollHeight > one.clientHeight + 1
-        || one.scrollWidth > one.clientWidth + 1;
-      return /auto|scroll/.test(overflowX + overflowY) && isLarger && one.tabIndex < 0
-        && !one.querySelector(within);
-    }).map((one) => one.className),
-  };
-}"""
 SOUND = {**{"nameless": [], "h1": 1, "jumps": [], "twice": [], "lost": []}, "unreached": []}
-CONTRAST = """() => {
-  const parse = (text) => text.match(/[\\d.]+/g).map(Number);
-  const over = (top, below) => {
-    const a = top[3] ?? 1;
-    return [0, 1, 2].map((i) => a * top[i] + (1 - a) * below[i]);
-  };
-  const light = (rgb) => rgb.map((x) => x / 255)
-    .map((x) => (x <= 0.04045 ? x / 12.92 : ((x + 0.055) / 1.055) ** 2.4))
-    .reduce((sum, x, i) => sum + x * [0.2126, 0.7152, 0.0722][i], 0);
-  const ownText = (one) => [...one.childNodes].filter((n) => n.nodeType === 3)
-    .map((n) => n.data.trim()).join("");
-  const wrong = [];
-  for (const one of document.querySelectorAll("body *")) {
-    const isSeen = one.getBoundingClientRect().width > 3;
-    if (!ownText(one) || !isSeen || one.closest("svg, script, style, noscript")) continue;
-    const layers = [];
-    for (let at = one; at; at = at.parentElement) {
-      layers.unshift(parse(getComputedStyle(at).backgroundColor));
-    }
-    const ground = layers.reduce((below, top) => over(top, below), [255, 255, 255]);
-    const ink = over(parse(getComputedStyle(one).color), ground);
-    const [a, b] = [light(ink), light(ground)].sort((x, y) => y - x);
-    const ratio = (a + 0.05) / (b + 0.05);
-    if (ratio < 4.5) wrong.push(`${ownText(one).slice(0, 30)}: ${ratio.toFixed(2)}`);
-  }
-  return wrong;
-}"""
-"""Texts that stand out too little from what is behind them, with their ratio (WCAG AA: 4.5)."""
 
 
 def test_results_say_what_was_found_and_lead_to_models_and_samples(visit):
@@ -407,14 +344,14 @@ def test_every_view_can_be_read_and_reached_and_hostile_names_do_nothing(
     path = site if is_of_site else made.out / "report.html"
     one = visiting(path, draws=name in ("plan", "poses"))
     page = one.open(view, **words)
-    assert page.evaluate(STRUCTURE) == SOUND
+    assert page.evaluate(f"{LOOK}.structure()") == SOUND
     for scheme in ("light", "dark"):
         page.emulate_media(color_scheme=scheme)
-        assert page.evaluate(CONTRAST) == []
+        assert page.evaluate(f"{LOOK}.contrast()") == []
     for width in (1024, 390):
         page.set_viewport_size({"width": width, "height": 844})
         assert page.evaluate(WIDE)
-        assert page.evaluate(STRUCTURE) == SOUND
+        assert page.evaluate(f"{LOOK}.structure()") == SOUND
     if "s" in words and view == "samples":
         box = page.locator(".bar-top h1").bounding_box()
         assert box
@@ -456,13 +393,13 @@ def test_a_leaderboard_says_what_was_found_and_shows_how_models_fail(
     assert set(page.locator(".thumbs small").all_inner_texts()) == {" level 4"}
     page.locator(".thumbs a").first.click()
     expect(page.locator(".wall canvas").first).to_have_attribute("data-drawn", number)
-    assert page.evaluate(STRUCTURE) == SOUND
+    assert page.evaluate(f"{LOOK}.structure()") == SOUND
     page.locator(".wall a").first.click()
     page.go_back()
     expect(page.locator(".wall li")).not_to_have_count(0)
 
 
-def test_what_is_not_there_is_said(site_visit):
+def test_what_is_not_there_is_said(visiting, site):
     for view in ("model", "scene", "nothing"):
-        page = site_visit.open(view, m="<b>x", s="<b>y")
+        page = visiting(site).open(view, m="<b>x", s="<b>y")
         expect(page.locator("h1")).to_contain_text("There is no such")

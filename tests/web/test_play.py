@@ -7,7 +7,6 @@ import socket
 import struct
 import threading
 import time
-from typing import NamedTuple
 
 import pytest
 from hypothesis import given
@@ -33,8 +32,7 @@ PICKING = Picking(
 
 
 class Clock:
-    def __init__(self):
-        self.now = 0.0
+    now = 0.0
 
     def __call__(self):
         return self.now
@@ -70,25 +68,23 @@ async def test_nothing_is_shown_before_the_beginning_and_no_name_or_answer_ever(
         await task
 
 
-def test_the_clock_runs_from_the_first_look_and_stands_still_in_pauses():
-    async def play():
-        clock = Clock()
-        session, task = await asked(clock)
-        for now, act in (
-            (100.0, session.begin),
-            (200.0, lambda: session.state(-1)),
-            (203.0, session.pause),
-            (400.0, session.begin),
-        ):
-            clock.now = now
-            act()
-        clock.now = 401.0
-        assert session.state(-1)["elapsed_s"] == 3.0
-        clock.now = 403.5
-        session.answer(session.state(-1)["change"], tuple(map(Pick, [1, 0, 1])))
-        return await task
-
-    assert asyncio.run(play()) == ("1 0 1", 5.5)
+@in_a_loop
+async def test_the_clock_runs_from_the_first_look_and_stands_still_in_pauses():
+    clock = Clock()
+    session, task = await asked(clock)
+    for now, act in (
+        (100.0, session.begin),
+        (200.0, lambda: session.state(-1)),
+        (203.0, session.pause),
+        (400.0, session.begin),
+    ):
+        clock.now = now
+        act()
+    clock.now = 401.0
+    assert session.state(-1)["elapsed_s"] == 3.0
+    clock.now = 403.5
+    session.answer(session.state(-1)["change"], tuple(map(Pick, [1, 0, 1])))
+    assert await task == ("1 0 1", 5.5)
 
 
 @in_a_loop
@@ -182,12 +178,6 @@ def token(server):
     return server.address.rstrip("/").rpartition("/")[2]
 
 
-class Answer(NamedTuple):
-    status: int
-    headers: dict[str, str]
-    body: bytes
-
-
 def ask(server, method="GET", path="/{token}/state", body=None, **headers):
     """A request as a page of the server makes it, but for what is given; None leaves out."""
     usual = {"Host": server.hosts[0]}
@@ -203,9 +193,9 @@ def ask(server, method="GET", path="/{token}/state", body=None, **headers):
             connection.putheader(name, value.format(port=server.server_port))
     connection.endheaders(body)
     answer = connection.getresponse()
-    found = Answer(answer.status, dict(answer.headers), answer.read())
+    answer.body = answer.read()
     connection.close()
-    return found
+    return answer
 
 
 def test_it_listens_on_the_loopback_address_alone(server, session):

@@ -12,7 +12,7 @@ from types import SimpleNamespace
 import pytest
 
 from tests.fork_server import fork_server
-from tests.web.conftest import Visit
+from tests.web.conftest import LOOK, Visit
 from tests.workspace import SCENES, plan_text, questions, read_lines, write_questions
 
 SUBTASKS = ("SH", "OR", "AD", "VP")
@@ -261,15 +261,13 @@ def fits_the_phone(page):
 
 def sent_to(page):
     """Texts of the prompt, which is one click away, and digests of the bytes of the pictures."""
-    digest = """async image => {
-        const bytes = await (await fetch(image.src)).arrayBuffer();
-        const sum = new Uint8Array(await crypto.subtle.digest("SHA-256", bytes));
-        return [...sum].map(one => one.toString(16).padStart(2, "0")).join("");
-    }"""
     page.get_by_text("The model's exact prompt").click()
     shown = page.locator("details .text").all_inner_texts()
     texts = [text for text in shown if not text.startswith("[picture: ")]
-    pictures = {image.evaluate(digest) for image in page.locator("figure img").all()}
+    pictures = {
+        image.evaluate(f"image => {LOOK}.digest(image)")
+        for image in page.locator("figure img").all()
+    }
     return [*texts, *pictures]
 
 
