@@ -207,20 +207,11 @@ def compare(
     for scenes that share base scenes. Shows p values with Holm's correction, and the difference
     that each test could have detected.
     """
-    from phyblock.results.compare import (
-        compare_models,
-        compare_runs,
-        compare_view,
-        ranks_view,
-        write_comparison,
-    )
+    from phyblock.results.compare import compare_view, ranks_view, write_comparison
     from phyblock.results.load import load_run
 
-    first = load_run(run)
-    if other is None:
-        comparison = compare_models(first, models, track, measure)
-    else:
-        comparison = compare_runs(first, load_run(other), models, track, measure)
+    beside = None if other is None else load_run(other)
+    comparison = load_run(run).compare(beside, models, track, measure)
     console = make_console()
     print_table(console, compare_view(comparison))
     if len(comparison.table[["a", "b"]].drop_duplicates()) > 1 and len(comparison.ranks):

@@ -6,13 +6,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from phyblock.config.suite import REPEAT, Variant, VarySpec
+from phyblock.config.suite import REPEAT
 from phyblock.errors import Problem, SpecError
 from phyblock.files import OutFolder
 from phyblock.results.estimates import (
@@ -108,8 +108,7 @@ def _field(run: Run, path: str) -> Any:
     return value or None
 
 
-@dataclass(frozen=True)
-class Part:
+class Part(NamedTuple):
     """The subject of one row of a pair: a cell, and the criterion if there are several."""
 
     name: str
@@ -124,6 +123,11 @@ class Side:
     label: str
     model: str
     run: Run
+
+
+def sides_of(run: Run, models: Sequence[str] = ()) -> list[Side]:
+    """Return the named models of a run, or all, as sides. Raises SpecError as `checked_models`."""
+    return [Side(name, name, run) for name in checked_models(run, models)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,6 +148,16 @@ class Samples:
         """True where a side has a sample, (sides, keys)."""
         return ~np.isnan(self.counts[:, :, 0])
 
+    def values(self, measure: Measure) -> list[pd.Series]:
+        """Return for each side the values of its samples by scene, item, seed and variant, NaN
+        where a value is not defined.
+        """
+        index, of_sides = (
+            pd.MultiIndex.from_frame(self.keys),
+            zip(self.counts, self.has, strict=True),
+        )
+        return [pd.Series(measure.value(counts[has]), index[has]) for counts, has in of_sides]
+
 
 @dataclass(frozen=True)
 class Comparable:
@@ -154,18 +168,9 @@ class Comparable:
 
     track: str
     measure: Measure
-    cells: tuple[Cell, ...]
+    cells: Mapping[str, Cell]
     parts: tuple[Part, ...]
     how: str
-
-    def pooled(self, part: Part) -> list[str]:
-        """Return the cells that a part is made of, without means."""
-        members = pooled_in(self._cells[part.cell], self.cells)
-        return [cell.name for cell in self.cells if cell.name in members]
-
-    @property
-    def _cells(self) -> dict[str, Cell]:
-        return {cell.name: cell for cell in self.cells}
 
     def samples(self, sides: Sequence[Side], part: Part, design: Design) -> Samples:
         """Return the samples of sides in the headline setting and matcher of a design.
@@ -176,8 +181,9 @@ class Comparable:
         wanted = dict(zip(SCORED_BY, (design.setting, design.matcher, part.criterion), strict=True))
         tables, counts = [], []
         for name, run in runs.items():
-            rows = counted_rows(run, self.track, self.measure.counted, self.cells, design)
-            masks = np.stack([rows.cells[cell] for cell in self.pooled(part)])
+            rows = counted_rows(run, self.track, self.measure.counted, self.cells.values(), design)
+            pooled = pooled_in(self.cells[part.cell], self.cells)
+            masks = np.stack([rows.cells[name] for name in pooled])
             used = masks.any(axis=0)
             for column, value in wanted.items():
                 used &= rows.about[column].isin(["", value]).to_numpy() | (not value)
@@ -199,13 +205,11 @@ class Comparable:
         """Yield each model with the values of its samples in the measure's unit, by scene, item,
         seed and variant, without samples that have no value.
         """
-        sides = [Side(name, name, run) for name in run.design.model_names]
-        samples = self.samples(sides, part, design)
-        index = pd.MultiIndex.from_frame(samples.keys)
-        for side, counts, has in zip(sides, samples.counts, samples.has, strict=True):
-            if has.any():
-                worth = self.measure.scale * self.measure.value(counts)
-                yield side.model, pd.Series(worth, index=index)[has].dropna()
+        sides = sides_of(run)
+        found = self.samples(sides, part, design).values(self.measure)
+        for side, worth in zip(sides, found, strict=True):
+            if len(worth):
+                yield side.model, self.measure.scale * worth.dropna()
 
     def contrast(
         self,
@@ -221,18 +225,18 @@ class Comparable:
         """
         measure, both = self.measure, samples.has[list(pair)].all(axis=0)
         scene, scenes = pd.factorize(samples.keys["scene"].to_numpy()[both], sort=True)
-        pooled, counts = self.pooled(part), samples.counts[list(pair)][:, both]
+        cell, counts = self.cells[part.cell], samples.counts[list(pair)][:, both]
+        pooled = pooled_in(cell, self.cells)
         sums = np.zeros((len(scenes), 2, len(pooled), counts.shape[-1]))
         for side in range(2):
             np.add.at(sums[:, side], (scene, samples.cell[both]), counts[side])
         asked = np.bincount(samples.cell[both], minlength=len(pooled)) > 0
-        cell, cells = self._cells[part.cell], self._cells
 
         def worth(of: Floats) -> Floats:
             single = measure.value(of)
             there = np.broadcast_to(asked, single.shape)
             known = {name: (single[..., n], there[..., n]) for n, name in enumerate(pooled)}
-            return cell_value(cell, cells, known)[0]
+            return cell_value(cell, self.cells, known)[0]
 
         clusters, scale = Clusters.of([parents[name] for name in scenes]), measure.scale
         estimate = bounded(
@@ -263,12 +267,12 @@ def comparable(run: Run, track: str, measure: str = "") -> Comparable:
         raise SpecError(Problem(f"track {track}", message, "--measure", measure, allowed))
     headline = Headline(run, track)
     chosen = known[measure] if measure else headline.measure
-    columns, cells = headline.columns, chosen.counted.cells or run.cells(track)
+    columns = headline.columns
+    cells = {cell.name: cell for cell in chosen.counted.cells or run.cells(track)}
     criteria = [s.criterion for s in columns if s.measure == chosen.name and s.criterion]
     # A pooled part of a mean is too small to be compared alone.
-    names = [
-        cell.name for cell in cells if cell.of or not any(cell.name in other.of for other in cells)
-    ]
+    joined = {name for cell in cells.values() for name in cell.of}
+    names = [name for name, cell in cells.items() if cell.of or name not in joined]
     parts = [Part(name, name) for name in names]
     if criteria:
         parts = [Part(one, name, one) for name in names for one in reversed(criteria)]
@@ -299,31 +303,44 @@ class Comparison:
     how: str
 
 
-def compare_models(
-    run: Run, models: Sequence[str] = (), track: str = "", measure: str = ""
+def compare(
+    run: Run,
+    other: Run | None = None,
+    models: Sequence[str] = (),
+    track: str = "",
+    measure: str = "",
 ) -> Comparison:
-    """Compare every pair of models of a run overall, or two models in every part.
+    """Compare every pair of models of a run, or each model with itself in the `other` run.
 
-    `models` limits the comparison to these; `track` is by default the first of the run, `measure`
-    the main one of the track. Raises SpecError for an unknown name, or for fewer than two models.
+    `models` limits the comparison to these; of two models and two runs, one is of each run. A
+    single pair is compared in every part of the track, several overall. `track` is by default the
+    first one that all runs have, `measure` the main one of the track. Raises SpecError for unknown
+    names, for fewer than two models, and for runs that cannot be compared.
     """
-    sides = [Side(name, name, run) for name in checked_models(run, models)]
-    if len(sides) < 2:
-        allowed = f"two of: {', '.join(run.design.model_names)}"
-        raise SpecError(Problem(str(run.path), "needs two models to compare", allowed=allowed))
-    what = comparable(run, _shared_track([run], track), measure)
-    parts = what.parts if len(sides) == 2 else what.parts[-1:]
-    return compare(list(combinations(sides, 2)), parts, what, _with_rank(sides, what.track))
+    runs = [run] if other is None else [run, other]
+    if other is None:
+        sides = sides_of(run, models)
+        if len(sides) < 2:
+            allowed = f"two of: {', '.join(run.design.model_names)}"
+            raise SpecError(Problem(str(run.path), "needs two models to compare", allowed=allowed))
+        pairs = list(combinations(sides, 2))
+    else:
+        pairs = _pairs_of_runs(run, other, models)
+    shared = [name for name in kinds() if all(name in one.design.suite.tracks for one in runs)]
+    if not shared or (track and track not in shared):
+        where, allowed = ", ".join(str(one.path) for one in runs), ", ".join(shared) or "none"
+        raise SpecError(Problem(where, "has no such track to compare", "track", track, allowed))
+    what = comparable(run, track or shared[0], measure)
+    parts = what.parts
+    if other is not None:
+        known = comparable(other, what.track, what.measure.name).parts
+        parts = tuple(part for part in parts if part in known)
+    ranked = with_rank(sides, what.track) if other is None else ()
+    return compare_pairs(pairs, parts if len(pairs) == 1 else parts[-1:], what, ranked)
 
 
-def compare_runs(
-    first: Run, second: Run, models: Sequence[str] = (), track: str = "", measure: str = ""
-) -> Comparison:
-    """Compare each model that both runs have, or two `models`, one of each run.
-
-    A single pair is compared in every part, several overall; `track` and `measure` are as for
-    `compare_models`. Raises SpecError for unknown names.
-    """
+def _pairs_of_runs(first: Run, second: Run, models: Sequence[str]) -> list[tuple[Side, Side]]:
+    """Return two models as the sides of a pair, or each model that both runs have."""
     if len(models) == 2:
         names = [(*checked_models(first, models[:1]), *checked_models(second, models[1:]))]
     else:
@@ -336,28 +353,13 @@ def compare_runs(
             hint = "name one of each: --models A,B"
             raise SpecError(Problem(where, message, allowed=allowed, hint=hint))
         names = [(name, name) for name in models or shared]
-    tags = first.path.resolve().name, second.path.resolve().name
-    tags = tags if tags[0] != tags[1] else (str(first.path), str(second.path))
-    tags = tags if tags[0] != tags[1] else ("first", "second")
-    pairs = [
-        (Side(f"{a} ({tags[0]})", a, first), Side(f"{b} ({tags[1]})", b, second)) for a, b in names
-    ]
-    what = comparable(first, _shared_track([first, second], track), measure)
-    other = comparable(second, what.track, what.measure.name)
-    parts = [part for part in what.parts if part in other.parts]
-    return compare(pairs, parts if len(pairs) == 1 else parts[-1:], what)
+    folders = first.path.resolve().name, second.path.resolve().name
+    tags = (folders, (str(first.path), str(second.path)), ("first", "second"))
+    one, two = next(pair for pair in tags if pair[0] != pair[1])
+    return [(Side(f"{a} ({one})", a, first), Side(f"{b} ({two})", b, second)) for a, b in names]
 
 
-def _shared_track(runs: Sequence[Run], wanted: str) -> str:
-    """Return the track to compare: `wanted`, else the first one that all runs have."""
-    shared = [name for name in kinds() if all(name in run.design.suite.tracks for run in runs)]
-    if not shared or (wanted and wanted not in shared):
-        where, allowed = ", ".join(str(run.path) for run in runs), ", ".join(shared) or "none"
-        raise SpecError(Problem(where, "has no such track to compare", "track", wanted, allowed))
-    return wanted or shared[0]
-
-
-def compare(
+def compare_pairs(
     pairs: Sequence[tuple[Side, Side]],
     parts: Sequence[Part],
     what: Comparable,
@@ -415,16 +417,16 @@ def rank_ranges_of(sides: Sequence[Side], track: str) -> dict[str, tuple[int, in
 
     Raises SpecError for runs that cannot be compared.
     """
-    ranked = _with_rank(sides, track)
+    ranked = with_rank(sides, track)
     if len(ranked) < 2:
         return {side.label: (1, 1) for side in ranked}
     what = comparable(ranked[0].run, track)
-    found = compare(list(combinations(ranked, 2)), what.parts[-1:], what, ranked)
+    found = compare_pairs(list(combinations(ranked, 2)), what.parts[-1:], what, ranked)
     rows = found.ranks.to_dict("records")
     return {str(row["model"]): (int(row["best"]), int(row["worst"])) for row in rows}
 
 
-def _with_rank(sides: Sequence[Side], track: str) -> list[Side]:
+def with_rank(sides: Sequence[Side], track: str) -> list[Side]:
     """Return the sides that are models, not baselines, with a value and all their records."""
     able = {}
     for run in {id(side.run): side.run for side in sides}.values():
@@ -525,7 +527,7 @@ def write_comparison(found: Comparison, folder: Path) -> tuple[Path, ...]:
 
     Raises StoreError if they cannot be written.
     """
-    files = compare_view(found).files("comparison", "comparison")
+    files = compare_view(found).files("comparison")
     files |= {"ranks.csv": to_csv(found.ranks, "%.6f")}
     return OutFolder(folder).write(files)
 
@@ -545,50 +547,32 @@ def sensitivity_frame(run: Run) -> pd.DataFrame:
     factor. Empty if the run varies nothing.
     """
     rows: list[dict[str, Any]] = []
-    vary = run.design.suite.vary
-    for track in run.design.suite.tracks if vary.factors else ():
-        what = comparable(run, track)
-        for model, scores, clusters in _scores(run, what):
-            for factor in (one for one in vary.factors if one != REPEAT):
-                # (items, levels, blocks with each seed)
-                of_levels = np.moveaxis(scores[:, :, _places(vary, factor)], 1, 3)
-                part = shift(of_levels.reshape(*of_levels.shape[:2], -1), clusters)
-                sd, lo, hi = (what.measure.scale * end for end in (part.sd, part.lo, part.hi))
-                row = {"track": track, "model": model, "factor": factor, "shift": sd}
-                row |= {"levels": of_levels.shape[1], "shift_lo": lo}
-                row["shift_hi"] = np.minimum(hi, what.measure.most_apart)
-                rows.append(row | {"n_items": len(scores), "n_clusters": clusters.size})
-    return pd.DataFrame(rows, columns=list(_COLUMNS))
-
-
-def _scores(run: Run, what: Comparable) -> Iterator[tuple[str, Floats, Clusters]]:
-    """Yield each model with its scores, (items, seeds, variants), and the items' base scenes."""
-    # Only items answered under every condition, which may differ between models.
     suite, parents = run.design.suite, base_scenes(run)
-    sides = [Side(name, name, run) for name in run.design.model_names]
-    samples = what.samples(sides, what.parts[-1], run.design)
+    factors = [factor for factor in suite.vary.factors if factor != REPEAT]
     ways = [(seed, one.key) for seed in suite.seeds for one in suite.vary.variants]
-    index = pd.MultiIndex.from_frame(samples.keys)
-    for side, counts, has in zip(sides, samples.counts, samples.has, strict=True):
-        sizes = samples.keys[has].groupby(["scene", "item"]).size()
-        names = sorted(sizes.index[sizes == len(ways)])
-        if names:
-            wanted = pd.MultiIndex.from_tuples([(*name, *way) for name in names for way in ways])
-            worth = np.nan_to_num(what.measure.value(counts[index.get_indexer(wanted)]))
-            scores = worth.reshape(len(names), len(suite.seeds), len(suite.vary.variants))
-            yield side.model, scores, Clusters.of([parents[scene] for scene, _ in names])
-
-
-def _places(vary: VarySpec, factor: str) -> NDArray[np.intp]:
-    """Return numbers of the variants by factor level, (levels, blocks)."""
-    levels = vary.names(factor)
-    places: dict[Variant, dict[str, int]] = {}
-    for place, variant in enumerate(vary.variants):
-        here = dict(variant.levels)
-        level = here.pop(factor, levels[0])
-        places.setdefault(Variant(tuple(here.items())), {})[level] = place
-    whole = [found for found in places.values() if len(found) == len(levels)]
-    return np.array([[found[level] for found in whole] for level in levels], dtype=np.intp)
+    # Variants are all combinations of levels, with the repeats of each in sequence.
+    sizes = [len(suite.seeds), *(len(suite.vary.names(factor)) for factor in factors), -1]
+    for track in suite.tracks if suite.vary.factors else ():
+        what = comparable(run, track)
+        sides = sides_of(run)
+        found = what.samples(sides, what.parts[-1], run.design).values(what.measure)
+        for side, worth in zip(sides, found, strict=True):
+            # Only items answered under every condition, which may differ between models.
+            by_way = worth.fillna(0.0).unstack(["seed", "variant"]).reindex(columns=ways)
+            whole = by_way.dropna()
+            if whole.empty:
+                continue
+            clusters = Clusters.of([parents[scene] for scene, _ in whole.index])
+            scores = np.moveaxis(whole.to_numpy().reshape(len(whole), *sizes), 1, -1)
+            for place, factor in enumerate(factors, 1):
+                levels = np.moveaxis(scores, place, 1)
+                part = shift(levels.reshape(*levels.shape[:2], -1), clusters)
+                sd, lo, hi = (what.measure.scale * end for end in (part.sd, part.lo, part.hi))
+                row = {"track": track, "model": side.model, "factor": factor, "shift": sd}
+                row |= {"levels": levels.shape[1], "shift_lo": lo}
+                row["shift_hi"] = np.minimum(hi, what.measure.most_apart)
+                rows.append(row | {"n_items": len(whole), "n_clusters": clusters.size})
+    return pd.DataFrame(rows, columns=list(_COLUMNS))
 
 
 def sensitivity_table(run: Run) -> TextTable | None:

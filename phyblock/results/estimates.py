@@ -4,22 +4,21 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import jinja2
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from phyblock.config.suite import Suite
 from phyblock.errors import Problem, StoreError
 from phyblock.records.files import RECORDS
 from phyblock.results.load import Design, Run, track_measures
 from phyblock.scoring.plan import Floats
 from phyblock.scoring.statistics import Clusters, in_range, jackknife
-from phyblock.text import plain_sum
 from phyblock.tracks.base import kind_of
 from phyblock.tracks.measures import (
     CELL,
@@ -55,7 +54,7 @@ class Rows:
 
 
 def counted_rows(
-    run: Run, track: str, counted: SampleCounts, cells: Sequence[Cell], design: Design | None = None
+    run: Run, track: str, counted: SampleCounts, cells: Iterable[Cell], design: Design | None = None
 ) -> Rows:
     """Return the counts of a track's samples in these cells.
 
@@ -93,7 +92,7 @@ def counted_rows(
     return Rows(about, numbers, dict(_masks(about, counted.cells or cells)))
 
 
-def _masks(about: pd.DataFrame, cells: Sequence[Cell]) -> Iterator[tuple[str, NDArray[np.bool_]]]:
+def _masks(about: pd.DataFrame, cells: Iterable[Cell]) -> Iterator[tuple[str, NDArray[np.bool_]]]:
     """Yield the cells that are not means with the masks of their rows, by level, part or all."""
     code, held = pd.factorize(about["levels"].to_numpy())
     for cell in cells:
@@ -175,12 +174,10 @@ def cell_value(
     return np.where(whole > 0, mean, np.nan), whole > 0
 
 
-def pooled_in(cell: Cell, cells: Sequence[Cell]) -> frozenset[str]:
+def pooled_in(cell: Cell, cells: Mapping[str, Cell]) -> list[str]:
     """Return the cells that a cell is made of, without means."""
-    if not cell.of:
-        return frozenset([cell.name])
-    by_name = {other.name: other for other in cells}
-    return frozenset().union(*(pooled_in(by_name[name], cells) for name in cell.of))
+    parts = [name for part in cell.of for name in pooled_in(cells[part], cells)]
+    return parts or [cell.name]
 
 
 def _estimates(
@@ -221,7 +218,7 @@ def _estimates(
             values.append(np.stack([cell_value(c, by_name, known)[0] for c in cells], axis=-1))
         return np.stack(values, axis=-1)
 
-    members = np.array([[n in pooled_in(cell, cells) for n in pooled] for cell in cells])
+    members = np.array([[n in pooled_in(cell, by_name) for n in pooled] for cell in cells])
     by_cell = clusters.behind(present.reshape(len(present), -1)).reshape(present.shape[1:])
     each = [np.any(present[:, :, own], axis=-1) for own in members]
     behind = np.stack([clusters.behind(one) for one in each], axis=-1)
@@ -261,8 +258,7 @@ def track_notes(run: Run, track: str) -> tuple[str, ...]:
     return tuple(filter(None, notes))
 
 
-@dataclass(frozen=True)
-class HeadlineColumn:
+class HeadlineColumn(NamedTuple):
     """A measure in a cell as a column of a headline, with its `criterion` if there are several."""
 
     measure: str
@@ -272,8 +268,7 @@ class HeadlineColumn:
     main: bool = False
 
 
-@dataclass(frozen=True)
-class Value:
+class Value(NamedTuple):
     """An estimate as shown in tables, in the unit of its measure (percent for shares).
 
     `value` is over all samples, pooled over seeds; `lo` and `hi` are NaN without an interval.
@@ -284,8 +279,7 @@ class Value:
     hi: float
 
 
-@dataclass(frozen=True)
-class Floor:
+class Floor(NamedTuple):
     """The strongest baseline that never sees the goal, and its value as shown in tables."""
 
     name: str
@@ -302,6 +296,23 @@ def headline_rows(estimates: pd.DataFrame, design: Design) -> pd.DataFrame:
         estimates["setting"].isin(["", design.setting])
         & estimates["matcher"].isin(["", design.matcher])
     ]
+
+
+def shown_values(
+    run: Run, track: str, design: Design | None = None
+) -> dict[tuple[str, str, str, str], Value]:
+    """Return the values of a track in the headline setting and matcher, by model, measure, cell
+    and criterion. With the criterion "", a value is that of the last one.
+    """
+    scale = {measure.name: measure.scale for measure in track_measures(track)}
+    rows = headline_rows(track_estimates(run, track), design or run.design)
+    fields = ("model", "measure", CELL, "criterion", "value", "lo", "hi")
+    found = {}
+    for row in zip(*(rows[name].tolist() for name in fields), strict=True):
+        model, measure, cell, criterion, *numbers = row
+        value = Value(*(scale[measure] * float(number) for number in numbers))
+        found[model, measure, cell, criterion] = found[model, measure, cell, ""] = value
+    return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -347,18 +358,13 @@ class Headline:
     @cached_property
     def values(self) -> dict[tuple[str, str], Value]:
         """Its values by model and heading."""
-        scale = {measure.name: measure.scale for measure in track_measures(self.track)}
-        rows = headline_rows(track_estimates(self.run, self.track), self.design or self.run.design)
-        fields = ("measure", CELL, "criterion", "model", "value", "lo", "hi")
-        listed = list(zip(*(rows[name].tolist() for name in fields), strict=True))
-        values = {}
-        for column in self.columns:
-            for measure, cell, criterion, model, *numbers in listed:
-                is_here = (measure, cell) == (column.measure, column.cell)
-                if is_here and column.criterion in ("", criterion):
-                    shown = (scale[measure] * float(number) for number in numbers)
-                    values[str(model), column.heading] = Value(*shown)
-        return values
+        known = shown_values(self.run, self.track, self.design)
+        return {
+            (model, column.heading): known[model, column.measure, column.cell, column.criterion]
+            for column in self.columns
+            for model in self.run.design.model_names
+            if (model, column.measure, column.cell, column.criterion) in known
+        }
 
     @cached_property
     def ranked(self) -> dict[str, Value]:
@@ -374,15 +380,14 @@ class Headline:
         run, measure = self.run, self.measure
         blind = run.design.baselines & set(kind_of(self.track).report().floors)
         known = [Floor(model, one.value) for model, one in self.ranked.items() if model in blind]
-        cells = {cell.name: cell for cell in run.cells(self.track)}
-
-        def guessing(chance: Callable[[Suite, str], float], cell: Cell) -> float:
-            if not cell.of:
-                return chance(run.design.suite, cell.name)
-            return plain_sum(guessing(chance, cells[name]) for name in cell.of) / len(cell.of)
-
         if measure.chance is not None and len(track_estimates(run, self.track)):
-            worth = guessing(measure.chance, cells[self.main.cell])
+            cells = {cell.name: cell for cell in run.cells(self.track)}
+            cell, is_there = cells[self.main.cell], np.ones((), dtype=bool)
+            guessed = {
+                name: (np.asarray(measure.chance(run.design.suite, name)), is_there)
+                for name in pooled_in(cell, cells)
+            }
+            worth = float(cell_value(cell, cells, guessed)[0])
             known.append(Floor("chance", measure.scale * worth))
         best = max if measure.better == "higher" else min
         return best(known, key=lambda floor: floor.value) if known else None

@@ -17,7 +17,7 @@ import pandas as pd
 
 from phyblock.files import OutFolder, cache_dir
 from phyblock.results.compare import (
-    compare_models,
+    compare,
     sensitivity_frame,
     sizes_text,
 )
@@ -129,7 +129,7 @@ def forest(run: Run, *, track: str) -> Figure | None:
     models = list(Headline(run, track).ranked)
     if len(models) < 2:
         return None
-    found = compare_models(run, models, track)
+    found = compare(run, None, models, track)
     table = found.table.dropna(subset=["difference"])
     if table.empty:
         return None

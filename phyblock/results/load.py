@@ -100,14 +100,8 @@ def frames_of(
     # Replaced records have no row.
     row_of = pd.Series(range(len(frame)), index=frame.index)
     counts = {}
-    named = {
-        (track, measure.counted.name): measure.counted.columns
-        for track in taken
-        for measure in track_measures(track)
-    }
     for key, rows in ((key, rows) for key, rows in numbers.items() if rows):
-        names = enumerate(("row", *SCORED_BY, *named.get(key, ())))
-        held = pd.DataFrame(rows).rename(columns=dict(names))
+        held = pd.DataFrame(rows).rename(columns=dict(enumerate(("row", *SCORED_BY))))
         held["row"] = held["row"].map(row_of)
         held = held.dropna(subset="row").astype({"row": "intp"})
         counts[key] = held.sort_values("row", kind="stable", ignore_index=True)
@@ -264,11 +258,9 @@ class Run:
 
         Raises SpecError for unknown names or runs that cannot be compared.
         """
-        from phyblock.results.compare import compare_models, compare_runs
+        from phyblock.results.compare import compare
 
-        if other is None:
-            return compare_models(self, models, track, measure)
-        return compare_runs(self, other, models, track, measure)
+        return compare(self, other, models, track, measure)
 
     def cells(self, track: str) -> tuple[Cell, ...]:
         """Return the cells of a track, the last of which is the whole."""

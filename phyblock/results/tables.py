@@ -6,19 +6,19 @@ import math
 from collections import Counter
 from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import pandas as pd
 
 from phyblock.files import OutFolder
 from phyblock.registry import added_measures
-from phyblock.results.compare import Side, rank_ranges_of, rank_text, sensitivity_table
+from phyblock.results.compare import rank_ranges_of, rank_text, sensitivity_table, sides_of
 from phyblock.results.estimates import (
     Headline,
     Value,
-    headline_rows,
-    track_estimates,
+    shown_values,
     track_notes,
 )
 from phyblock.results.load import TOKENS, Run, load_run, track_measures
@@ -40,7 +40,7 @@ from phyblock.results.text import (
 )
 from phyblock.text import counted
 from phyblock.tracks.base import kind_of, kinds
-from phyblock.tracks.measures import CELL, Cell, Layout, LayoutColumn, Measure
+from phyblock.tracks.measures import Cell, Layout, LayoutColumn, Measure
 from phyblock.types import OUTCOMES
 
 _FURTHER = ("published", "sensitivity", "coverage", "cost")
@@ -68,10 +68,7 @@ def _layouts(run: Run, track: str) -> Mapping[str, Layout]:
 def filled(run: Run, track: str, layout: Layout) -> TextTable:
     """Fill a layout with the estimates of a track in the headline setting and matcher."""
     measures, cells = {one.name: one for one in track_measures(track)}, run.cells(track)
-    known: dict[tuple[str, ...], Mapping[Hashable, Any]] = {}
-    for row in headline_rows(track_estimates(run, track), run.design).to_dict("records"):
-        key = (str(row["model"]), str(row["measure"]), str(row[CELL]))
-        known[*key, str(row["criterion"])] = known[*key, ""] = row
+    known = shown_values(run, track)
     there = {(measure, cell) for _, measure, cell, _ in known}
     shown = list(_shown(layout, measures, cells, there))
     # The subject of a row besides its model: a measure, a cell, or nothing.
@@ -81,15 +78,13 @@ def filled(run: Run, track: str, layout: Layout) -> TextTable:
         parts = {cell.name: cell.heading for cell in cells if cell.name in with_values}
     elif layout.rows != "model":
         parts = {name: measures[name].heading for name in layout.rows}
-    rows: list[dict[str, Any]] = []
-    for model in run.design.model_names:
-        for part in parts:
-            rows.append({"model": model, **({"part": part} if part else {})})
-            for one in shown:
-                measure = measures[one.measure or part]
-                found = known.get((model, measure.name, one.cell or part, one.criterion), {})
-                for name, end in one.ends:
-                    rows[-1][name] = measure.scale * found.get(end, math.nan)
+    rows = []
+    for model, part in product(run.design.model_names, parts):
+        row: dict[str, Any] = {"model": model, **({"part": part} if part else {})}
+        for one in shown:
+            key = (model, one.measure or part, one.cell or part, one.criterion)
+            row |= {name: getattr(known.get(key, _NONE), end) for name, end in one.ends.items()}
+        rows.append(row)
     fields = [texts("model", "Model", once=True)]
     if layout.rows != "model":
         fields.append(Column("", "", True, lambda row: parts[row["part"]]))
@@ -101,15 +96,13 @@ def filled(run: Run, track: str, layout: Layout) -> TextTable:
     )
 
 
-@dataclass(frozen=True)
-class _Shown:
-    """A column of numbers: its measure and cell ("" for those of the row), and its format.
-
-    `ends` maps columns of the frame to columns of the estimates.
+class _Shown(NamedTuple):
+    """A column of numbers: its measure and cell ("" for those of the row), and `ends`: the parts of
+    values that its columns in the frame hold.
     """
 
     column: Column
-    ends: tuple[tuple[str, str], ...]
+    ends: Mapping[str, str]
     measure: str
     cell: str
     criterion: str
@@ -123,28 +116,27 @@ def _shown(
 ) -> Iterator[_Shown]:
     """Yield the columns of a layout that have an estimate."""
     of_rows = [] if isinstance(layout.rows, str) else list(layout.rows)
-    for spec in layout.columns:
+    for spec, cell in [(one, at) for one in layout.columns for at in one.places(cells)]:
         asked = list(spec.headings) or of_rows
-        for cell in spec.places(cells):
-            if spec.cells == "each" and not any((name, cell.name) in there for name in asked):
-                continue
-            for name, heading in (spec.headings or {"": ""}).items():
-                level = f"level{cell.name}" if cell.name.isdigit() else cell.name
-                about = {"cell": cell.heading, "group": cell.group, "measure": name}
-                about |= {"level": level, "criterion": spec.criterion}
-                measure, group = measures[name or of_rows[0]], spec.group.format(**about)
-                unit = measure.unit or "Value"
-                heading = (heading or (measure.heading if name else "")).format(**about)
-                if spec.show == "both" and not group:
-                    heading, group = unit, heading
-                key = spec.key.format(**about)
-                at = (name, "" if layout.rows == "cell" else cell.name, spec.criterion)
-                if spec.show != "interval":
-                    shown = values(key, heading or unit, group, spec.digits)
-                    yield _Shown(shown, ((key, "value"),), *at)
-                if spec.show != "value":
-                    lo, hi = f"{key}_lo", f"{key}_hi"
-                    yield _Shown(intervals(group, lo, hi), ((lo, "lo"), (hi, "hi")), *at)
+        if spec.cells == "each" and not any((name, cell.name) in there for name in asked):
+            continue
+        for name, heading in (spec.headings or {"": ""}).items():
+            level = f"level{cell.name}" if cell.name.isdigit() else cell.name
+            about = {"cell": cell.heading, "group": cell.group, "measure": name}
+            about |= {"level": level, "criterion": spec.criterion}
+            measure, group = measures[name or of_rows[0]], spec.group.format(**about)
+            unit = measure.unit or "Value"
+            heading = (heading or (measure.heading if name else "")).format(**about)
+            if spec.show == "both" and not group:
+                heading, group = unit, heading
+            key = spec.key.format(**about)
+            at = (name, "" if layout.rows == "cell" else cell.name, spec.criterion)
+            if spec.show != "interval":
+                shown = values(key, heading or unit, group, spec.digits)
+                yield _Shown(shown, {key: "value"}, *at)
+            if spec.show != "value":
+                lo, hi = f"{key}_lo", f"{key}_hi"
+                yield _Shown(intervals(group, lo, hi), {lo: "lo", hi: "hi"}, *at)
 
 
 def _sample_notes(run: Run, track: str) -> Iterator[str]:
@@ -297,7 +289,7 @@ def write_tables(path: str | Path) -> TablesWritten:
     made = make_tables(run)
     texts: dict[str, str | bytes] = {f"{TABLES}/estimates.csv": to_csv(run.estimates, "%.6f")}
     for name, table in made.items():
-        texts |= table.files(f"{TABLES}/{name}", name)
+        texts |= table.files(f"{TABLES}/{name}")
     folder = OutFolder(run.path)
     written = folder.write(texts)
     # Coverage may be complete now, and an earlier table obsolete.
@@ -369,7 +361,7 @@ def headline_table(run: Run, track: str, coverage: pd.DataFrame) -> TextTable:
     units = {one.name: one.unit for one in track_measures(track)}
     unit = " (%)" if {units[column.measure] for column in columns} == {"%"} else ""
     mine = coverage[coverage["track"] == track].set_index("model").to_dict("index")
-    ranks = rank_ranges_of([Side(name, name, run) for name in run.design.model_names], track)
+    ranks = rank_ranges_of(sides_of(run), track)
     rows = []
     for model in dict.fromkeys((*headline.ranked, *run.design.model_names)):
         found = [known.get((model, column.heading), _NONE) for column in columns]

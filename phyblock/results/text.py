@@ -75,23 +75,18 @@ class TextTable:
             rows.append(tuple(texts))
         return cls(caption, tuple(columns), tuple(rows), tuple(notes), frame)
 
-    def files(self, name: str, label: str, float_format: str = "%.6f") -> dict[str, str | bytes]:
-        """Return the table as CSV, Markdown and LaTeX, by file name."""
+    def files(self, name: str) -> dict[str, str | bytes]:
+        """Return the table as CSV, Markdown and LaTeX, by the names of the files."""
         return {
-            f"{name}.csv": to_csv(self.frame, float_format),
+            f"{name}.csv": to_csv(self.frame, "%.6f"),
             f"{name}.md": to_markdown(self),
-            f"{name}.tex": to_latex(self, f"phyblock-{label}"),
+            f"{name}.tex": to_latex(self, f"phyblock-{Path(name).name}"),
         }
 
     def plain(self) -> dict[str, Any]:
         """Return the table as plain values for JSON."""
         columns = [[column.name, column.group, column.is_text] for column in self.columns]
-        return {
-            "caption": self.caption,
-            "columns": columns,
-            "rows": self.rows,
-            "notes": self.notes,
-        }
+        return {"caption": self.caption, "columns": columns, "rows": self.rows, "notes": self.notes}
 
 
 def texts(key: str, heading: str, *, once: bool = False) -> Column:

@@ -12,8 +12,7 @@ from hypothesis import given
 from phyblock.config.suite import VarySpec
 from phyblock.errors import SpecError
 from phyblock.results.compare import (
-    compare_models,
-    compare_runs,
+    compare,
     ranks_view,
     sensitivity_frame,
     sensitivity_table,
@@ -44,7 +43,7 @@ def one_seed(*records, **facts):
 def test_turning_a_pair_round_turns_all_that_it_says_round(records):
     run = run_of(records, manifest())
     one, other = (
-        compare_models(run, names).table for names in (["alpha", "beta"], ["beta", "alpha"])
+        compare(run, models=names).table for names in (["alpha", "beta"], ["beta", "alpha"])
     )
     assert (one["better"] == other["worse"]).all()
     for name, sign in (("difference", -1), ("se", 1), ("p_holm", 1), ("n_samples", 1)):
@@ -61,7 +60,7 @@ def test_only_samples_that_both_have_are_compared():
         *plans("beta", {"001": 4, "002": 0, "003": 4}),
         record("beta", "000", outcome="missing", scores=[score(0, 0, 4)]),
     )
-    row = compare_models(run).table.set_index("part").loc["overall"]
+    row = compare(run).table.set_index("part").loc["overall"]
     assert (row["n_samples"], row["n_scenes"], row["n_clusters"]) == (2, 2, 2)
     assert (row["value_a"], row["value_b"], row["difference"]) == (25, 50, -25)
     assert (row["better"], row["worse"], row["same"]) == (0, 1, 1)
@@ -72,10 +71,10 @@ def test_a_model_without_any_reply_is_not_compared_though_empty_plans_count():
         record("beta", scene, outcome="api_error", scores=[score(0, 0, 4)]) for scene in LEVELS
     ]
     run = one_seed(*plans("alpha", dict.fromkeys(LEVELS, 3)), *silent, missing="count")
-    assert set(compare_models(run).table["verdict"]) == {"nothing to compare"}
+    assert set(compare(run).table["verdict"]) == {"nothing to compare"}
     some = record("beta", "000", scores=[score(3, 1, 1)])
     run = one_seed(*plans("alpha", dict.fromkeys(LEVELS, 3)), some, *silent[1:], missing="count")
-    row = compare_models(run).table.set_index("part").loc["overall"]
+    row = compare(run).table.set_index("part").loc["overall"]
     assert (row["n_samples"], row["better"], row["same"]) == (5, 4, 1)
 
 
@@ -90,10 +89,10 @@ def test_what_cannot_be_told_is_said():
             scenes=n,
             levels=[2],
         )
-        verdicts = compare_models(run).table.set_index("part")["verdict"]
+        verdicts = compare(run).table.set_index("part")["verdict"]
         assert verdicts["overall"] == verdict
     lone = one_seed(*plans("alpha", {"000": 4}), *plans("beta", {"000": 0}))
-    verdicts = compare_models(lone).table.set_index("part")["verdict"]
+    verdicts = compare(lone).table.set_index("part")["verdict"]
     assert verdicts["overall"] == "cannot tell: a single base scene"
     assert verdicts["3"] == "nothing to compare"
 
@@ -114,7 +113,7 @@ def test_a_gap_is_found_among_many_models_and_ranks_say_what_is_sure():
         scenes=60,
         levels=[2],
     )
-    found = compare_models(run)
+    found = compare(run)
     assert len(found.table) == 26 * 25 // 2
     against_best = found.table[found.table["a"] == "best"]
     assert (against_best["verdict"] == "best is better").all()
@@ -131,13 +130,13 @@ def test_two_runs_are_compared_by_the_models_they_share_or_by_two_named():
         manifest(seeds=[0]),
     )
     second = replace(second, path=Path("other"))
-    shared = compare_runs(first, second).table.set_index("part")
+    shared = compare(first, second).table.set_index("part")
     assert shared.loc["overall", ["a", "b"]].tolist() == ["alpha (run)", "alpha (other)"]
     assert shared.loc["overall", "difference"] == 50
-    named = compare_runs(first, second, ["alpha", "beta"]).table.set_index("part")
+    named = compare(first, second, ["alpha", "beta"]).table.set_index("part")
     assert named.loc["overall", "difference"] == -25
     with pytest.raises(SpecError, match="has no such model"):
-        compare_runs(first, second, ["beta", "alpha"])
+        compare(first, second, ["beta", "alpha"])
 
 
 def other_track():
@@ -159,15 +158,15 @@ def other_track():
 def test_runs_that_cannot_be_compared_are_refused(other, said):
     first = one_seed(*plans("alpha", {"000": 4}), models=["alpha"])
     with pytest.raises(SpecError, match=said):
-        compare_runs(first, other)
+        compare(first, other)
 
 
 def test_what_a_run_lacks_is_named():
     run = one_seed(*plans("alpha", {"000": 4}), models=["alpha"])
     with pytest.raises(SpecError, match=r"found: vqa(?s:.*)allowed: full_planning"):
-        compare_models(run_of([], manifest()), track="vqa")
+        compare(run_of([], manifest()), track="vqa")
     with pytest.raises(SpecError, match="needs two models"):
-        compare_models(run)
+        compare(run)
 
 
 def test_the_first_runs_policy_on_missing_replies_holds_for_both():
@@ -178,7 +177,7 @@ def test_the_first_runs_policy_on_missing_replies_holds_for_both():
 
     for missing, samples in (("skip", 1), ("count", 3)):
         other = of("count" if missing == "skip" else "skip", "001")
-        row = compare_runs(of(missing, "000"), other).table.set_index("part").loc["overall"]
+        row = compare(of(missing, "000"), other).table.set_index("part").loc["overall"]
         assert (row["n_samples"], row["difference"]) == (samples, 0)
 
 

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from phyblock.files import LIST
-from phyblock.results.compare import compare_models, write_comparison
+from phyblock.results.compare import compare, write_comparison
 from phyblock.results.load import load_run, track_measures
 from phyblock.results.tables import coverage_frame, make_tables, summary_of, write_tables
 from phyblock.results.text import NO_VALUE, Column, TextTable, number, to_latex, to_markdown
@@ -153,7 +153,7 @@ def test_the_summary_ranks_models_and_says_who_is_above_the_blind_baseline():
         ("1\N{EN DASH}2", "alpha", "25.0"),
         ("", "random", "0.0"),
     ]
-    ranks = compare_models(run).ranks
+    ranks = compare(run).ranks
     assert ranks[["model", "best", "worst"]].values.tolist() == [["beta", 1, 2], ["alpha", 1, 2]]
     (sentence,) = summary.blind
     assert sentence.endswith("of 2 models are above goal-blind (50.0).")
@@ -171,7 +171,7 @@ def test_latex_compiles_inside_any_document(tmp_path):
         manifest(models=[(models[0], "GPT-4.1"), *models[1:]]),
     )
     write_tables(folder)
-    write_comparison(compare_models(load_run(folder)), folder / "tables")
+    write_comparison(compare(load_run(folder)), folder / "tables")
     files = sorted(file.relative_to(folder) for file in folder.glob("*/*.tex"))
     assert {"tables/comparison.tex", "tables/table1.tex"} <= {file.as_posix() for file in files}
     inputs = "".join(rf"\input{{{file.with_suffix('')}}}" for file in files)

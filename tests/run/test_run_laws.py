@@ -16,7 +16,7 @@ import phyblock
 from phyblock.data.base import VERSION_FILE, read_version
 from phyblock.errors import DataError, SpecError
 from phyblock.records.files import read_manifest
-from phyblock.results.compare import check_pair, compare_runs
+from phyblock.results.compare import check_pair, compare
 from phyblock.results.estimates import Headline
 from phyblock.results.load import load_run
 from tests.servers.chassis import Running
@@ -226,7 +226,7 @@ def test_runs_on_two_versions_are_not_mixed(workspace):
     versions = [read_manifest(path).dataset for path in (workspace.out, newer)]
     assert [data.version for data in versions if data is not None] == [1, 2]
     with pytest.raises(SpecError, match=r"dataset\.version: cannot be compared"):
-        compare_runs(load_run(workspace.out), load_run(newer), ["oracle"])
+        compare(load_run(workspace.out), load_run(newer), ["oracle"])
 
 
 def test_answers_to_two_versions_of_questions_are_not_mixed():

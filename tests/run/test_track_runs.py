@@ -16,7 +16,7 @@ from phyblock.data.scenes import read_builtin
 from phyblock.domain.question import LETTERS
 from phyblock.domain.scene import AssemblyTask, Candidate, CandidateSet, Scene
 from phyblock.errors import InputError, SpecError
-from phyblock.results.compare import compare_runs
+from phyblock.results.compare import compare
 from phyblock.results.load import load_run
 from phyblock.run.rescore import rescore
 from phyblock.sim.engine import ENGINES, described_engine, installed_engines
@@ -340,7 +340,7 @@ def test_runs_in_two_engines_are_scored_anywhere_and_never_compared(inside, monk
     assert (usual / "records.jsonl").read_text() == asked
     runs = [load_run(out) for out in (usual, other)]
     with pytest.raises(SpecError, match="physics: cannot be compared"):
-        compare_runs(*runs, ())
+        compare(*runs)
 
 
 @pytest.mark.parametrize(("mode", "outcome"), [("length", "truncated"), ("filtered", "refusal")])

@@ -14,7 +14,7 @@ import pytest
 
 from phyblock import registry
 from phyblock.errors import SpecError
-from phyblock.results.compare import comparable, compare_models
+from phyblock.results.compare import comparable, compare
 from phyblock.results.estimates import Headline
 from phyblock.results.load import load_run, track_measures
 from phyblock.results.tables import write_tables
@@ -184,7 +184,7 @@ def test_the_leading_measure_leads_everywhere(run):
     for kind, leading in ((Counting, ERROR), (led_by(EXACT, ERROR, EXACT), EXACT)):
         show(kind)
         assert comparable(run, "counting").measure == leading
-        assert compare_models(run).name == leading.heading
+        assert compare(run).name == leading.heading
         one = (SiteRun("run", run, Sources()),)
         (track,) = board_of(one, entries_of(one))["tracks"]
         assert track["main"] == Headline(run, "counting").main.heading
