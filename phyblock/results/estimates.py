@@ -377,17 +377,17 @@ class Headline:
     @cached_property
     def floor(self) -> Floor | None:
         """The strongest blind baseline, or uniform guessing, in the main column."""
-        run, measure = self.run, self.measure
-        blind = run.design.baselines & set(kind_of(self.track).report().floors)
+        run, measure, report = self.run, self.measure, kind_of(self.track).report()
+        blind, guessed = run.design.baselines & set(report.floors), report.chance
         known = [Floor(model, one.value) for model, one in self.ranked.items() if model in blind]
-        if measure.chance is not None and len(track_estimates(run, self.track)):
+        if guessed is not None and len(track_estimates(run, self.track)):
             cells = {cell.name: cell for cell in run.cells(self.track)}
             cell, is_there = cells[self.main.cell], np.ones((), dtype=bool)
-            guessed = {
-                name: (np.asarray(measure.chance(run.design.suite, name)), is_there)
+            single = {
+                name: (np.asarray(guessed(run.design.suite, name)), is_there)
                 for name in pooled_in(cell, cells)
             }
-            worth = float(cell_value(cell, cells, guessed)[0])
+            worth = float(cell_value(cell, cells, single)[0])
             known.append(Floor("chance", measure.scale * worth))
         best = max if measure.better == "higher" else min
         return best(known, key=lambda floor: floor.value) if known else None

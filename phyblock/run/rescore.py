@@ -212,7 +212,8 @@ async def _again(track: Track, item: Item, record: Record, where: str, *, strict
             return await judge_reply(track, item, given, record)
         # The record holds no executed plan.
         return await judge_reply(track, item, {**given, "error": None})
-    episode, asked = track.again(item, record), record.asked_turns
+    episode = track.start(item, record.seed, {}, with_messages=False, earlier=record)
+    asked = record.asked_turns
     for turn in asked:
         if await episode.request() is None:
             break

@@ -418,8 +418,8 @@ class Session:
         fields["run"] = self._store.run
         if sample.variant.levels:
             fields["variant"] = dict(sample.variant.levels)
-        if request is not None and request.messages:
-            fields["prompt"] = self._store.keep_prompt(request, track.prompt_name)
+        if request is not None and request.messages and track.prompt is not None:
+            fields["prompt"] = self._store.keep_prompt(request, track.prompt.name)
         if request is not None and request.response_format and config.kind == "litellm":
             fields["asked"] = "response_format" if config.sends_format else "prompt"
         return fields

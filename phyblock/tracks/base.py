@@ -106,9 +106,9 @@ class Track(ABC):
     record: ClassVar[type[Record] | None] = None
     """The model of its records; None if it adds no fields."""
     counted: ClassVar[tuple[SampleCounts, ...]] = ()
-    """The counts that its measures are computed from; some are taken when a sample is judged."""
+    """The counts that its YAML file names."""
     results: ClassVar[Mapping[str, Any]] = {}
-    """Further arguments of `read_report`, besides its YAML file."""
+    """The fields of its report that are code."""
     varies: ClassVar[tuple[str, ...]] = ("repeats",)
     """Factors of a suite's section `vary` that change its requests."""
     plays: ClassVar[bool] = False
@@ -141,7 +141,7 @@ class Track(ABC):
     @classmethod
     @functools.cache
     def report(cls) -> TrackReport:
-        """Return the layout of tables and figures, from the YAML file of its name and `results`."""
+        """Return its measures, with the layout of tables and figures."""
         return read_report(cls.name, cls.counted, **cls.results)
 
     @classmethod
@@ -174,11 +174,6 @@ class Track(ABC):
         if form != "text":
             path = path.with_name(f"{path.stem}_json.j2")
         return path if path.is_file() else None
-
-    @property
-    def prompt_name(self) -> str:
-        """Name of the prompt; "" if every model is a recording."""
-        return "" if self.prompt is None else self.prompt.name
 
     def open_prompt(self) -> Prompt:
         """Return the suite's own template, else the bundled one for its answer format.
@@ -249,6 +244,11 @@ class Track(ABC):
             if one.sample is not None
         }
 
+    @functools.cached_property
+    def _counted(self) -> Sequence[SampleCounts]:
+        measures = (*self.report().measures, *added_measures(self.name))
+        return tuple(dict.fromkeys(measure.counted for measure in measures))
+
     async def judge_apart(self, item: Any, text: str | None, _earlier: Record | None) -> Judgement:
         """Return the result of `judge`, computed in another process if it takes long.
 
@@ -257,15 +257,17 @@ class Track(ABC):
         return self.judge(item, text)
 
     def start(
-        self, item: Any, seed: int, params: Mapping[str, object], *, with_messages: bool
+        self,
+        item: Any,
+        seed: int,
+        params: Mapping[str, object],
+        *,
+        with_messages: bool,
+        earlier: Record | None = None,
     ) -> Episode:
-        """Return an episode that has not begun."""
-        raise NotImplementedError
+        """Return an episode that has not begun.
 
-    def again(self, item: Any, record: Record) -> Episode:
-        """Return the episode of a record before its first reply, to be judged again.
-
-        Results that replies alone do not determine, such as falls, come from the record.
+        Results that replies alone do not determine, such as falls, come from an `earlier` record.
         """
         raise NotImplementedError
 
@@ -291,10 +293,10 @@ class Track(ABC):
         self, item: Any, seed: int, params: Mapping[str, object], *, with_messages: bool
     ) -> Request:
         """Return the request of one sample; without messages for models that need none."""
-        if not with_messages or self.shop is None:
-            return self.asked(item, seed, params)
-        pictures = await self.shop.images(self.drawings(item))
-        return self.asked(item, seed, params, self.messages(item, pictures))
+        messages: tuple[Message, ...] = ()
+        if with_messages and self.shop is not None:
+            messages = self.messages(item, await self.shop.images(self.drawings(item)))
+        return self.asked(item, seed, params, messages)
 
     def outlines(self, item: Any) -> Iterator[Request]:
         """Yield the requests of an item as far as they are known before any reply.
@@ -327,9 +329,7 @@ class Track(ABC):
         return Request(key, seed, messages, params, version, about, wanted, self.name)
 
     async def work_out(self, work: Callable[[], Any]) -> Any:
-        """Return the result of `work`, a `partial`, from another process, or without a shop from a
-        thread.
-        """
+        """Return the result of `work`, a `partial`, from another process, else from a thread."""
         if self.shop is None:
             return await asyncio.to_thread(work)
         return await self.shop.work_out(work)
@@ -437,21 +437,15 @@ def fair_order(strata: Sequence[int]) -> list[int]:
 def presented(
     task: AssemblyTask, seed: int, order: CandidateOrder, *, is_blind: bool = False
 ) -> AssemblyTask:
-    """Return the task as presented under a seed; the task itself if nothing differs."""
-    if order == "shuffled":
-        return in_order(task, shown_order(task, seed), seed, is_blind=is_blind)
-    numbers = range(1, len(task.candidates) + 1)
-    return in_order(task, numbers, is_blind=True) if is_blind else task
+    """Return the task as presented under a seed; the task itself if nothing differs.
 
-
-def shown_order(task: AssemblyTask, seed: int) -> tuple[int, ...]:
-    """Return the candidates' numbers in the file, in the order that the seed gives the scene.
-
-    The order is a sort by digests, so that it is the same on every machine.
+    A shuffled order is a sort by digests, so that it is the same on every machine.
     """
     numbers = range(1, len(task.candidates) + 1)
-    place = functools.partial(drawn_bytes, "candidate order", seed, task.scene.id)
-    return tuple(sorted(numbers, key=place))
+    if order == "shuffled":
+        place = functools.partial(drawn_bytes, "candidate order", seed, task.scene.id)
+        return in_order(task, sorted(numbers, key=place), seed, is_blind=is_blind)
+    return in_order(task, numbers, is_blind=True) if is_blind else task
 
 
 def in_order(

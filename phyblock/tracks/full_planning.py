@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal
 
@@ -137,29 +138,23 @@ def pick_plan(subject: PlanSubject) -> Picking:
     )
 
 
-def pose_choices(item: AssemblyTask, steps: Sequence[int]) -> Iterator[tuple[bool, bool]]:
-    """Yield two booleans for each named kind whose pose could be wrong: True if the pose that is
-    listed first is right, and True if the pose that was named first is.
+def pose_counts(item: AssemblyTask, record: Any) -> tuple[int, ...]:
+    """Count the named kinds whose pose could be wrong, for a plan or an episode: those named first
+    in the right pose, and all, where the pose that is listed first is right; then the others.
 
     Such a kind is needed in one or more poses, and also offered in others. Numbers that no
     candidate has are ignored.
     """
     offered, chosen = item.offered, dict[Kind, bool]()
-    for step in steps:
+    for step in record.parse.plan:
         if 1 <= step <= len(offered):
             chosen.setdefault(*offered[step - 1])
-    needed = {block.kind for block in item.scene.blocks}
-    for kind in needed & chosen.keys():
+    counts = Counter[tuple[bool, bool]]()
+    for kind in {block.kind for block in item.scene.blocks} & chosen.keys():
         right = [is_right for of, is_right in offered if of == kind]
-        if not all(right):
-            yield right[0], chosen[kind]
-
-
-def pose_counts(item: AssemblyTask, record: Any) -> tuple[int, ...]:
-    """Return the counts of `POSE_COUNTS` for a plan or an episode."""
-    choices = list(pose_choices(item, record.parse.plan))
-    n = [choices.count(one) for one in ((True, True), (True, False), (False, True), (False, False))]
-    return n[0], n[0] + n[1], n[2], n[2] + n[3]
+        counts[right[0], chosen[kind]] += not all(right)
+    first, later = ((counts[one, True], counts[one, False]) for one in (True, False))
+    return first[0], sum(first), later[0], sum(later)
 
 
 POSE_COUNTS = SampleCounts(

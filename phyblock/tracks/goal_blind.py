@@ -12,8 +12,7 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import chain, product
-from typing import Any
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,11 +106,10 @@ def goal_blind_plans(
     """
     if not scenes:
         return {}
-    kin = related(scenes)
+    kin, seen = related(scenes), areas or {}
     goals = [Goal(scene, candidates[scene.id], setting) for scene in scenes]
-    seen = areas or {}
     offered = [units(candidates[one.id], setting, seen.get(one.id)) for one in scenes]
-    heights = _heights(scenes, offered, goals, kin)
+    heights = _heights(offered, goals, kin)
     likely = zip(*(chances(offered, goals, kin, key) for key in keys), strict=True)
     plans_of = map(partial(_plans, repeats=repeats), offered, likely, heights)
     ways = list(zip(*plans_of, strict=True))
@@ -128,11 +126,10 @@ def goal_blind_plans(
     plans = {}
     for place, (scene, others) in enumerate(zip(scenes, kin, strict=True)):
         tp, wrong = (total - counts[:, others].sum(axis=1)).T
-        if (tp + wrong).any():
-            f1 = 2 * tp / np.maximum(2 * tp + wrong, 1)
-            plans[scene.id] = ways[int(f1.argmax())][place]
-        else:
-            plans[scene.id] = Plan(tuple(range(1, len(candidates[scene.id]) + 1)))
+        # Without unrelated scenes, nothing is learned.
+        best = int((2 * tp / np.maximum(2 * tp + wrong, 1)).argmax())
+        every = Plan(tuple(range(1, len(candidates[scene.id]) + 1)))
+        plans[scene.id] = ways[best][place] if (tp + wrong).any() else every
     return plans
 
 
@@ -143,51 +140,56 @@ def chances(
 
     Shape (units, copies); rare rows of the table are shrunk towards the overall frequency.
     """
-    copies = np.arange(1, _MOST_COPIES + 1)
-    needed = [
-        np.array([len(goal.equal_to[unit.numbers[0]]) for unit in of])[:, None] >= copies
-        for of, goal in zip(offered, goals, strict=True)
-    ]
+
+    def needed(unit: Unit, goal: Goal) -> list[bool]:
+        count = len(goal.equal_to[unit.numbers[0]])
+        return [count > copy for copy in range(_MOST_COPIES)]
+
     return [
         (part[:, 1:] + _PRIOR * whole[1:] / max(whole[0], 1.0)) / (part[:, :1] + _PRIOR)
-        for part, whole in _left_out([list(map(key, of)) for of in offered], needed, kin)
+        for part, whole in _left_out(offered, goals, kin, key, needed)
     ]
 
 
 def _heights(
-    scenes: Sequence[Scene],
-    offered: Sequence[Sequence[Unit]],
-    goals: Sequence[Goal],
-    kin: Sequence[Sequence[int]],
+    offered: Sequence[Sequence[Unit]], goals: Sequence[Goal], kin: Sequence[Sequence[int]]
 ) -> list[Floats]:
     """Return for each unit the mean height, 0..1, of its type and pose in unrelated scenes."""
-    values = []
-    for scene, of, goal in zip(scenes, offered, goals, strict=True):
-        layers, rows = scene.graph.layers, []
-        for unit in of:
-            equal = goal.equal_to[unit.numbers[0]]
-            height = sum(layers[v] for v in equal) / len(equal) / max(layers) if equal else 0.0
-            rows.append((bool(equal), height))
-        values.append(np.array(rows))
-    keys = [[(unit.candidate.type, unit.candidate.look[2]) for unit in of] for of in offered]
+
+    def height(unit: Unit, goal: Goal) -> tuple[bool, float]:
+        equal, layers = goal.equal_to[unit.numbers[0]], goal.graph.layers
+        mean = sum(layers[v] for v in equal) / len(equal) / max(layers) if equal else 0.0
+        return bool(equal), mean
+
+    def key(unit: Unit) -> Hashable:
+        return unit.candidate.type, unit.candidate.look[2]
+
     # Sums from which a part was subtracted are accurate to nine digits.
     return [
         ((part[:, 2] + whole[2] / max(whole[1], 1.0)) / (part[:, 1] + 1.0)).round(9)
-        for part, whole in _left_out(keys, values, kin)
+        for part, whole in _left_out(offered, goals, kin, key, height)
     ]
 
 
 def _left_out(
-    keys: Sequence[Sequence[Hashable]],
-    values: Sequence[NDArray[Any]],
+    offered: Sequence[Sequence[Unit]],
+    goals: Sequence[Goal],
     kin: Sequence[Sequence[int]],
+    key: Key,
+    measure: Callable[[Unit, Goal], Sequence[float]],
 ) -> Iterator[tuple[Floats, Floats]]:
-    """Yield for each scene the sums over unrelated ones, by unit and in total; rows are counted."""
-    row_of = {key: row for row, key in enumerate(dict.fromkeys(chain.from_iterable(keys)))}
-    rows = [[row_of[key] for key in of] for of in keys]
-    table = np.zeros((len(keys), len(row_of), 1 + values[0].shape[1]))
-    for place, value in enumerate(values):
-        np.add.at(table[place], rows[place], np.hstack([np.ones((len(value), 1)), value]))
+    """Yield for each scene the number and the summed measures of units in unrelated scenes, of
+    those that have the key of each of its units, and of all.
+    """
+    row_of: dict[Hashable, int] = {}
+    rows = [[row_of.setdefault(key(unit), len(row_of)) for unit in of] for of in offered]
+    values = [
+        np.array([(1.0, *measure(unit, goal)) for unit in of])
+        for of, goal in zip(offered, goals, strict=True)
+    ]
+    table = np.zeros((len(rows), len(row_of), values[0].shape[1]))
+    for of_scene, places, value in zip(table, rows, values, strict=True):
+        np.add.at(of_scene, places, value)
     total = table.sum(axis=0)
     for place, others in enumerate(kin):
         rest = total - table[others].sum(axis=0)
@@ -198,11 +200,10 @@ def _plans(
     offered: Sequence[Unit], by_key: Sequence[Floats], heights: Floats, *, repeats: bool
 ) -> list[Plan]:
     """Return the plans of every way: all likely units by height, once or repeatedly."""
-    copies = by_key[0].shape[1]
     own = np.array([len(unit.numbers) for unit in offered])
-    unit, copy = (of.ravel() for of in np.indices((len(offered), copies)))
+    unit, copy = (of.ravel() for of in np.indices(by_key[0].shape))
     number = np.array([one.numbers[n % len(one.numbers)] for one in offered
-                       for n in range(copies)])  # fmt: skip
+                       for n in range(_MOST_COPIES)])  # fmt: skip
     height, is_first = heights[unit], copy < own[unit]
     orders = (np.lexsort((number, copy, height)), np.lexsort((number, height, copy)))
     plans = []
@@ -212,9 +213,9 @@ def _plans(
         first = any_copy & is_first
         # If every unit is likely enough, none is named again.
         any_copy[0] = first[0]
-        sorted_by = [(number[by], any_copy[:, by], first[:, by]) for by in orders]
-        for n, (numbers, *named), again in product(range(len(least)), sorted_by, {False, repeats}):
-            plans.append(Plan(tuple(numbers[named[not again][n]].tolist())))
+        for n, by, again in product(range(len(least)), orders, {False, repeats}):
+            named = (any_copy if again else first)[n, by]
+            plans.append(Plan(tuple(number[by][named].tolist())))
     return plans
 
 
@@ -236,14 +237,11 @@ def blind_guesses(
     is informative only in the file's order, so plans are learned separately for every order. The
     task's own goal is never used, in whatever order it is shown.
     """
-    order, view = suite.candidates.order, suite.images.view
-
-    @functools.cache  # A key of `_learned` holds all scenes, and hashing it takes milliseconds.
-    def learned(seed: int, sees_colors: bool) -> dict[str, Plan]:
-        return _learned(tuple(pool), order, seed, setting, view if sees_colors else None)
+    # A key of `_learned` holds all scenes, and hashing it takes milliseconds.
+    learned = functools.cache(partial(_learned, tuple(pool), suite.candidates.order, setting))
 
     def plan(task: AssemblyTask, *, sees_colors: bool = False) -> Plan:
-        return learned(task.seed, sees_colors)[task.key]
+        return learned(task.seed, suite.images.view if sees_colors else None)[task.key]
 
     return plan
 
@@ -252,8 +250,8 @@ def blind_guesses(
 def _learned(
     pool: tuple[AssemblyTask, ...],
     order: CandidateOrder,
-    seed: int,
     setting: Setting,
+    seed: int,
     view: View | None,
 ) -> dict[str, Plan]:
     shown = [presented(one, seed, order) for one in pool]

@@ -104,9 +104,9 @@ class Measure:
 
     `value` computes it from summed counts, shape (..., columns of `counted`), NaN where it is not
     defined. `heading`, `meaning` and `over` (the noun of what is counted) are for people; `unit`
-    "%" means values in [0, 1] that tables show times 100. `chance` is the value of guessing in a
-    cell that is not a mean. A measure that `is_difference` of two shares may be below zero. Values
-    in another unit are from 0 to `most` if that is given, infinity for no limit.
+    "%" means values in [0, 1] that tables show times 100. A measure that `is_difference` of two
+    shares may be below zero. Values in another unit are from 0 to `most` if that is given, infinity
+    for no limit.
     """
 
     name: str
@@ -117,7 +117,6 @@ class Measure:
     unit: Unit = "%"
     better: Better = "higher"
     over: str = "samples"
-    chance: Callable[[Suite, str], float] | None = None
     is_difference: bool = False
     most: float | None = None
 
@@ -216,9 +215,8 @@ class TrackReport:
     values are counted: Jinja templates with the variables `suite`, `spec` (the track's section of
     it) and `manifest`; empty results are dropped. `floors` names baselines that never see the goal,
     `short` the column of `Run.summary`, `success` the measure that is 1 if a sample is wholly
-    right.
-
-    `part_names` explain `Record.part`.
+    right. `chance` is the main measure of guessing in a cell that is not a mean. `part_names`
+    explain `Record.part`.
     """
 
     measures: tuple[Measure, ...]
@@ -229,6 +227,7 @@ class TrackReport:
     floors: Sequence[str] = ()
     short: str = ""
     success: str = ""
+    chance: Callable[[Suite, str], float] | None = None
     part_names: Mapping[str, str] = field(default_factory=dict)
 
     def heading(self, name: str) -> str:
@@ -240,37 +239,31 @@ class TrackReport:
         return next((m.heading for m in self.measures if m.name.endswith(f"_{name}")), plain)
 
 
-def read_report(
-    track: str,
-    counts: Iterable[SampleCounts],
-    code: Mapping[str, Mapping[str, Any]] | None = None,
-    **more: Any,
-) -> TrackReport:
+def read_report(track: str, counts: Iterable[SampleCounts], **code: Any) -> TrackReport:
     """Return the report of a track: its YAML file, joined with what is code.
 
     Measures are in groups that share fields. Each is the sum of the columns in `part` (by default
     the column of its name) over that of `whole`, a mean if its unit is not "%" or it says so; or
-    the `mean_of` others of its counts, or the `difference_of` two. `code` has those fields of
-    measures, by name, that are functions.
+    the `mean_of` others of its counts, or the `difference_of` two.
     """
     declared = read_own_yaml(Path(__file__).with_name(f"{track}.yaml"))
     by_name, measures = {counted.name: counted for counted in counts}, dict[str, Measure]()
     for group in declared.pop("measures"):
         for name, own in group.pop("of").items():
-            about = {**group, **own, **(code or {}).get(name, {})}
-            counted, is_mean = by_name[about.pop("counts")], about.pop("mean", False)
-            part, whole = ([n] if isinstance(n, str) else n or [] for n in
-                           (about.pop("part", name), about.pop("whole", None)))  # fmt: skip
+            about = {"part": name, "whole": (), "mean": False, **group, **own}
+            counted = by_name[about.pop("counts")]
+            named = about.pop("part"), about.pop("whole")
+            part, whole = ([one] if isinstance(one, str) else one for one in named)
+            by = mean_of if about.pop("mean") else ratio_of
             about.setdefault("over", *whole[:1])
             if about.get("unit", "%") != "%":
-                is_mean, about = True, {"most": math.inf, **about}
+                by, about = mean_of, {"most": math.inf, **about}
             if others := about.pop("mean_of", None):
                 value = _combined(measures, others, lambda parts: np.mean(parts, axis=0))
             elif others := about.pop("difference_of", None):
                 value = _combined(measures, others, lambda parts: parts[0] - parts[1])
                 about["is_difference"] = True
             else:
-                by = mean_of if is_mean else ratio_of
                 value = _divided(by, counted.columns, part, whole)
             measures[name] = Measure(name, counted=counted, value=value, **about)
     declared["headline"] = tuple(LayoutColumn(**column) for column in declared["headline"])
@@ -278,7 +271,7 @@ def read_report(
         name: Layout(**{**one, "columns": [LayoutColumn(**column) for column in one["columns"]]})
         for name, one in declared["tables"].items()
     }
-    return TrackReport(tuple(measures.values()), **declared, **more)
+    return TrackReport(tuple(measures.values()), **declared, **code)
 
 
 def _divided(by: Metric, columns: Sequence[str], *named: Sequence[str]) -> Metric:

@@ -14,7 +14,7 @@ import numpy as np
 
 from phyblock.config.validation import PictureControls, TemplateName
 from phyblock.domain.blocks import BlockType
-from phyblock.domain.scene import AssemblyTask, Block, CandidateSet, Plan, PoseStep, Scene
+from phyblock.domain.scene import AssemblyTask, Block, Plan, PoseStep, Scene
 from phyblock.files import bundled
 from phyblock.parsing.poses import (
     FARTHEST_PLACE_CM,
@@ -177,20 +177,32 @@ class PoseRecord(Record):
         """Return the blocks that were not refused, where they came to rest."""
         world: dict[int, Block] = {}
         given = () if self.parse is None else self.parse.steps
-        steps = zip(given, () if self.pose is None else self.pose.steps, strict=False)
-        for n, (one, step) in enumerate(steps, 1):
+        ended = () if self.pose is None else self.pose.steps
+        for n, (one, step) in enumerate(zip(given, ended, strict=False), 1):
             block = put(PoseStep(one.block, one.center_cm), task.candidates)
             if block is not None and step.end not in REFUSED_ENDS:
                 world[n] = block
             for rest in step.rests:
-                kind, euler_deg = world[rest.step].type, rest.euler_deg
-                place = origin_m(kind, euler_deg, rest.center_cm)
-                world[rest.step] = replace(world[rest.step], position_m=place, euler_deg=euler_deg)
+                place = origin_m(world[rest.step].type, rest.euler_deg, rest.center_cm)
+                world[rest.step] = replace(
+                    world[rest.step], position_m=place, euler_deg=rest.euler_deg
+                )
         return tuple(world.values())
 
 
 _END = ("end", "moved_cm", "overlap_cm", "knocked")
 _WHOLE = ("reached", "iou", "completed", "engine")
+Ended = tuple[Sequence[Mapping[str, Any]], Mapping[str, Any]]
+"""Endings of the steps of an executed plan, and the final world, as in records."""
+
+
+@functools.cache
+def pieces_of(block_type: BlockType) -> tuple[Piece, ...]:
+    """Return the convex pieces of a block in its body frame."""
+    return tuple(Piece(p.vertices_m, p.face_normals) for p in collision_pieces(block_type))
+
+
+_scorer = functools.lru_cache(maxsize=32)(PoseScorer)
 
 
 def judge_poses(
@@ -198,31 +210,31 @@ def judge_poses(
     text: str | None,
     settings: tuple[Setting, ...],
     matchers: tuple[Matcher, ...],
-    earlier: PoseRecord | None = None,
+    earlier: Record | None = None,
 ) -> Judgement:
     """Parse, score and execute a reply; a missing reply (None) is an empty plan.
 
     If an `earlier` record holds the same plan and tolerances, its result is used.
     """
-    n, scorer = len(item.candidates), _scorer(item.scene, item.candidates)
+    n, scorer = len(item.candidates), _scorer(item.scene, item.candidates, pieces_of)
     parsed = ParsedPoses((), None) if text is None else parse_poses(text, n)
-    given = parsed.steps
+    given, numbers = parsed.steps, [step.candidate for step in parsed.steps]
     blocks = [put(step, item.candidates) for step in given]
-    laid = (
-        Laid(step.candidate, block.position_m, block.euler_deg)
-        for step, block in zip(given, blocks, strict=True)
+    laid = [
+        Laid(number, block.position_m, block.euler_deg)
+        for number, block in zip(numbers, blocks, strict=True)
         if block is not None
-    )
-    poses = scorer.score(list(laid))
-    ended, whole = _ended_before(earlier, given) or _carried(item.scene, blocks)
+    ]
+    poses = scorer.score(laid)
     found = iter(poses[0].fits)
     fits = [None if block is None else next(found) for block in blocks]
-    numbers, ends = [step.candidate for step in given], [step["end"] for step in ended]
-    errors = pose_errors(scorer.goal, numbers, fits, ends)
+    ended, whole = _ended_before(earlier, given) or _executed(item.scene, blocks)
+    errors = pose_errors(scorer.goal, numbers, fits, [step["end"] for step in ended])
     # The plan without its poses, under every setting and matcher.
     plan = [number for number in numbers if 1 <= number <= n]
-    plan_scorer = AssemblyScorer(item.scene, item.candidates, settings)
-    scores = plan_scorer.score(Plan(tuple(plan)), matchers, None)
+    scores = AssemblyScorer(item.scene, item.candidates, settings).score(
+        Plan(tuple(plan)), matchers, None
+    )
     parse = {
         "parser": "poses",
         "rule": parsed.rule,
@@ -231,26 +243,19 @@ def judge_poses(
         "problem": parsed.problem,
         "steps": [{"block": step.candidate, "center_cm": step.center_cm} for step in given],
     }
-    pose = {
-        "right": {score.frame: list(score.right) for score in poses},
-        "steps": [
-            {**({"vertex": None} if fit is None else asdict(fit)), **end, "error": error}
-            for fit, end, error in zip(fits, ended, errors, strict=True)
-        ],
-        "limits": _LIMITS,
-        **whole,
-    }
+    steps = [
+        {**({"vertex": None} if fit is None else asdict(fit)), **end, "error": error}
+        for fit, end, error in zip(fits, ended, errors, strict=True)
+    ]
+    right = {score.frame: list(score.right) for score in poses}
+    pose = {"right": right, "steps": steps, "limits": _LIMITS, **whole}
     fields = {"parse": parse, "scores": list(map(vars, scores)), "pose": pose}
     return Judgement(parsed.rule is not None, fields)
 
 
-Ended = tuple[Sequence[Mapping[str, Any]], Mapping[str, Any]]
-"""Endings of the steps of an executed plan, and the final world, as in records."""
-
-
-def _ended_before(record: PoseRecord | None, given: Sequence[PoseStep]) -> Ended | None:
+def _ended_before(record: Record | None, given: Sequence[PoseStep]) -> Ended | None:
     """Return the result in a record of the same steps with these tolerances, or None."""
-    if record is None or record.pose is None or record.parse is None:
+    if not isinstance(record, PoseRecord) or record.pose is None or record.parse is None:
         return None
     pose = record.pose
     known = [PoseStep(s.block, s.center_cm) for s in record.parse.steps]
@@ -261,8 +266,8 @@ def _ended_before(record: PoseRecord | None, given: Sequence[PoseStep]) -> Ended
     return steps, {name: getattr(pose, name) for name in _WHOLE}
 
 
-def _carried(scene: Scene, blocks: Sequence[Block | None]) -> Ended:
-    # An engine executes one plan at a time, for all threads.
+def _executed(scene: Scene, blocks: Sequence[Block | None]) -> Ended:
+    """Return the result of an execution; the engine executes one plan at a time."""
     with _ONE_AT_A_TIME:
         done = execute(blocks, physics=execution_physics(scene.blocks))
     goal, reached = scene.blocks, blocks_reached(scene.blocks, done.blocks, *_REACHED.values())
@@ -276,9 +281,8 @@ def _carried(scene: Scene, blocks: Sequence[Block | None]) -> Ended:
             if before.distance_m(after) > _STILL_M or before.angle_deg(after) > _STILL_DEG:
                 lies[block.order] = after
                 place = [round(part, 2) + 0.0 for part in center_cm(block)]
-                rests.append(
-                    {"step": block.order, "center_cm": place, "euler_deg": block.euler_deg}
-                )
+                about = {"step": block.order, "center_cm": place, "euler_deg": block.euler_deg}
+                rests.append(about)
         steps.append({**{name: getattr(step, name) for name in _END}, "rests": rests})
     return steps, {
         "reached": reached,
@@ -286,38 +290,6 @@ def _carried(scene: Scene, blocks: Sequence[Block | None]) -> Ended:
         "completed": reached == len(goal) == len(done.blocks),
         "engine": described_engine(),
     }
-
-
-@functools.cache
-def pieces_of(block_type: BlockType) -> tuple[Piece, ...]:
-    """Return the convex pieces of a block in its body frame."""
-    return tuple(Piece(p.vertices_m, p.face_normals) for p in collision_pieces(block_type))
-
-
-@functools.lru_cache(maxsize=32)
-def _scorer(scene: Scene, candidates: CandidateSet) -> PoseScorer:
-    return PoseScorer(scene, candidates, pieces_of)
-
-
-def buildable_order(scene: Scene, wanted: Sequence[int]) -> list[int]:
-    """Return the vertices of a scene in a valid order that keeps balance, near the `wanted` one.
-
-    Each step takes the first block with which the structure surely stands, else the first with
-    which it is in balance at all, else the first. `wanted` is valid, too.
-    """
-    order: list[int] = []
-
-    def holds(vertex: int, verdict: Callable[[Sequence[Block]], bool]) -> bool:
-        placed = [replace(scene.blocks[v], order=n) for n, v in enumerate((*order, vertex))]
-        hanging = next(group for group in groups(placed) if placed[-1] in group)
-        return verdict(hanging)
-
-    needs = scene.graph.depends_on
-    while len(order) < len(scene):
-        ready = [v for v in wanted if v not in order and needs[v] <= set(order)]
-        steady = (v for rule in (surely_stands, is_balanced) for v in ready if holds(v, rule))
-        order.append(next(steady, ready[0]))
-    return order
 
 
 def written(steps: Iterable[PoseStep]) -> str:
@@ -334,11 +306,24 @@ def _built(
     rng: np.random.Generator,
     move: Callable[[Block, Center], Center] = lambda _, center: center,
 ) -> str:
-    """Answer with the goal's blocks in a random valid order that keeps balance, each moved."""
-    blocks, layers = subject.scene.blocks, subject.scene.graph.layers
+    """Answer with the goal's blocks in a random valid order that keeps balance, each moved.
+
+    Each step takes the first block with which the structure surely stands, else the first with
+    which it is in balance at all, else the first.
+    """
+    blocks, graph = subject.scene.blocks, subject.scene.graph
     drawn = rng.random(len(blocks)).tolist()
-    wanted = sorted(range(len(blocks)), key=lambda vertex: (layers[vertex], drawn[vertex]))
-    order = buildable_order(subject.scene, wanted)
+    wanted = sorted(range(len(blocks)), key=lambda vertex: (graph.layers[vertex], drawn[vertex]))
+    order: list[int] = []
+
+    def holds(vertex: int, verdict: Callable[[Sequence[Block]], bool]) -> bool:
+        placed = [replace(blocks[v], order=n) for n, v in enumerate((*order, vertex))]
+        return verdict(next(group for group in groups(placed) if placed[-1] in group))
+
+    while len(order) < len(blocks):
+        ready = [v for v in wanted if v not in order and graph.depends_on[v] <= set(order)]
+        steady = (v for rule in (surely_stands, is_balanced) for v in ready if holds(v, rule))
+        order.append(next(steady, ready[0]))
     return written(
         PoseStep(needed_candidate(subject, blocks[v]), move(blocks[v], center_cm(blocks[v])))
         for v in order
@@ -378,11 +363,10 @@ def _random(subject: PlanSubject, rng: np.random.Generator) -> str:
     steps = []
     for _ in range(_RANDOM_STEPS):
         number = int(rng.integers(1, len(subject.candidates) + 1))
-        x, y = rng.uniform(-_RANDOM_REACH_CM, _RANDOM_REACH_CM, 2)
-        z = rng.uniform(0.0, _RANDOM_REACH_CM)
+        x, y = rng.uniform(-_RANDOM_REACH_CM, _RANDOM_REACH_CM, 2).tolist()
+        steps.append(PoseStep(number, (x, y, float(rng.uniform(0.0, _RANDOM_REACH_CM)))))
         # Drawn but not used, so that answers stay the same as when turns were drawn.
         rng.integers(0, 4, 3)
-        steps.append(PoseStep(number, (float(x), float(y), float(z))))
     return written(steps)
 
 
@@ -402,9 +386,9 @@ POSE_RULES: Mapping[str, Callable[..., str]] = {
 def pick_poses(subject: PlanSubject) -> Picking:
     """Return the choices of a person: any candidates, each as often as needed, with its place."""
 
-    def step(pick: Pick) -> PoseStep:
-        x, y, z = pick.numbers
-        return PoseStep(pick.place + 1, (x, y, z))
+    def write(picks: Sequence[Pick]) -> str:
+        placed = ((pick.place + 1, pick.numbers) for pick in picks)
+        return written(PoseStep(number, (x, y, z)) for number, (x, y, z) in placed)
 
     return Picking(
         candidate_choices(len(subject.candidates), (KIT_LABEL,)),
@@ -412,7 +396,7 @@ def pick_poses(subject: PlanSubject) -> Picking:
         most=MOST_POSE_STEPS,
         repeats=True,
         noun="step",
-        write=lambda picks: written(map(step, picks)),
+        write=write,
         fields=tuple(NumberField(name, "cm", FARTHEST_PLACE_CM, 2, 0.5, 5.0) for name in "xyz"),
         task="Pick the blocks that build the goal, in order, and say where the center of each is.",
     )
@@ -516,8 +500,7 @@ class PosePlanning(SceneTrack):
 
         A plan that an earlier record holds is not executed again.
         """
-        known = earlier if isinstance(earlier, PoseRecord) else None
-        rules = (self.suite.settings, self.suite.scoring.matchers, known)
+        rules = (self.suite.settings, self.suite.scoring.matchers, earlier)
         found: Judgement = await self.work_out(partial(judge_poses, item, text, *rules))
         return found
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import json
 from collections import Counter
-from collections.abc import Callable, Container, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -159,40 +159,29 @@ class ChoiceRecord(Record):
         return None if self.answer is None else self.answer.given
 
 
-CATEGORY_NAMES = {
-    "object_property": "Property",
-    "object_relationship": "Relationship",
-    "scene_understanding": "Scene",
-    "dynamic_reasoning": "Dynamics",
-}
-_LETTER_COUNTS = [(kind, letter) for letter in LETTERS for kind in ("right", "given")]
+_HEADINGS = ("Property", "Relationship", "Scene", "Dynamics")
+"""Headings of the categories, in their order."""
 
 
-def _cells(asked: Container[str]) -> tuple[Cell, ...]:
-    """Return the subtasks of each category and their mean, as in Table 2, then the mean of all."""
+def cells_of(suite: Suite, manifest: Manifest) -> tuple[Cell, ...]:
+    """Return the cells of the subtasks that were asked: those of each category and their mean, as
+    in Table 2, then the mean of all.
+    """
+    counts = manifest.tracks.get("vqa", {}).get("by_subtask", {})
+    asked = counts or suite.section(VqaSpec).subtasks
     cells: list[Cell] = []
-    for category, subtasks in CATEGORIES.items():
-        heading = CATEGORY_NAMES[category]
+    for heading, (category, subtasks) in zip(_HEADINGS, CATEGORIES.items(), strict=True):
         if names := tuple(name for name in subtasks if name in asked):
             cells += [Cell(name, name, heading) for name in names]
             cells.append(Cell(category, heading, heading, names))
-    means = tuple(cell.name for cell in cells if cell.of)
-    return (*cells, Cell(OVERALL, WHOLE.heading, of=means))
-
-
-ALL_CELLS = _cells(SUBTASKS)
-"""The cells of a run that asks everything."""
-
-
-def _run_cells(suite: Suite, manifest: Manifest) -> tuple[Cell, ...]:
-    """Return the cells of the subtasks that were asked."""
-    asked = manifest.tracks.get("vqa", {}).get("by_subtask", {})
-    return _cells(asked or suite.section(VqaSpec).subtasks)
+    return (*cells, Cell(OVERALL, WHOLE.heading, of=tuple(cell.name for cell in cells if cell.of)))
 
 
 def _answer(record: ChoiceRecord) -> tuple[int, ...]:
-    given = record.answer
-    return given is not None and given.given == given.right, 1
+    return bool(record.is_correct), 1
+
+
+_LETTERS = [(kind, letter) for letter in LETTERS for kind in ("right", "given")]
 
 
 def _letters(record: ChoiceRecord) -> tuple[int, ...] | None:
@@ -200,28 +189,26 @@ def _letters(record: ChoiceRecord) -> tuple[int, ...] | None:
     answer = record.answer
     if answer is None or len(answer.right) != 1:
         return None
-    return (*(getattr(answer, kind) == letter for kind, letter in _LETTER_COUNTS), 1)
+    return (*(getattr(answer, kind) == letter for kind, letter in _LETTERS), 1)
 
 
-_SAME = ("suite.vqa.circular", "tracks.vqa.questions")
-_COLUMNS = tuple(f"{kind}_{letter.lower()}" for kind, letter in _LETTER_COUNTS)
-COUNTS = (
-    SampleCounts(
-        "answer",
-        ("correct", "n"),
-        record=_answer,
-        parts=lambda suite: suite.section(VqaSpec).rotations,
-        same=_SAME,
-    ),
-    SampleCounts("rotations", ("correct", "n"), record=_answer, same=_SAME),
-    SampleCounts("letters", (*_COLUMNS, "n"), record=_letters, cells=(WHOLE,), same=_SAME),
-)
+def _rotations(suite: Suite) -> int:
+    return suite.section(VqaSpec).rotations
 
 
 def _guessing(suite: Suite, cell: str) -> float:
     """Return the expected accuracy of uniform guesses in a subtask."""
     (subtask,) = (name for name in SUBTASKS if name == cell)
-    return chance(subtask) ** suite.section(VqaSpec).rotations
+    return chance(subtask) ** _rotations(suite)
+
+
+_SAME = ("suite.vqa.circular", "tracks.vqa.questions")
+_COLUMNS = (*(f"{kind}_{letter.lower()}" for kind, letter in _LETTERS), "n")
+COUNTS = (
+    SampleCounts("answer", ("correct", "n"), record=_answer, parts=_rotations, same=_SAME),
+    SampleCounts("rotations", ("correct", "n"), record=_answer, same=_SAME),
+    SampleCounts("letters", _COLUMNS, record=_letters, cells=(WHOLE,), same=_SAME),
+)
 
 
 @dataclass(frozen=True)
@@ -251,7 +238,6 @@ class Folds:
     """
 
     def __init__(self, questions: Sequence[Question]) -> None:
-        self._questions = questions
         bases = sorted({_bases(question)[0] for question in questions})
         self._fold = {base: place % FOLDS for place, base in enumerate(bases)}
 
@@ -263,11 +249,6 @@ class Folds:
         """True if a question shares no base scene with the questions of a fold."""
         return all(self._fold.get(base) != fold for base in _bases(question))
 
-    def known(self, fold: int, subtask: Subtask) -> list[Question]:
-        """Return the questions of a subtask that share no base scene with a fold."""
-        mine = (question for question in self._questions if question.subtask == subtask)
-        return [question for question in mine if self.is_known(fold, question)]
-
 
 def guesses_of(questions: Sequence[Question], learn: Callable[[Sequence[Question]], Rule]) -> Rule:
     """Return the rule that answers questions of a set, or rotations of them, by the rules that
@@ -277,7 +258,8 @@ def guesses_of(questions: Sequence[Question], learn: Callable[[Sequence[Question
 
     @functools.cache
     def learned(subtask: Subtask, fold: int) -> Rule:
-        return learn(folds.known(fold, subtask))
+        mine = (question for question in questions if question.subtask == subtask)
+        return learn([question for question in mine if folds.is_known(fold, question)])
 
     return lambda question: learned(question.subtask, folds.of(question))(question)
 
@@ -309,20 +291,18 @@ def _bases(question: Question) -> tuple[str, ...]:
     return question.scene.parents or (question.scene.id,)
 
 
-def _random_choice(subject: ChoiceSubject, rng: np.random.Generator) -> str:
-    n = len(subject.question.options)
-    if subject.question.subtask == "OR":
-        return choice_text(int(index) for index in rng.permutation(n))
-    return choice_text([int(rng.integers(n))])
-
-
 def choice_text(indices: Iterable[int]) -> str:
     """Return an answer in the reply form of the benchmark."""
     return "Answer: " + ", ".join(LETTERS[index] for index in indices)
 
 
+def _random(subject: ChoiceSubject, rng: np.random.Generator) -> str:
+    n, is_ordering = len(subject.question.options), subject.question.subtask == "OR"
+    return choice_text(rng.permutation(n).tolist() if is_ordering else [int(rng.integers(n))])
+
+
 CHOICE_RULES: Mapping[str, Callable[..., str]] = {
-    "random": _random_choice,
+    "random": _random,
     "oracle": lambda subject, _: choice_text(subject.question.answer),
     "majority": lambda subject, _: choice_text(subject.guess()),
 }
@@ -330,8 +310,7 @@ CHOICE_RULES: Mapping[str, Callable[..., str]] = {
 
 def pick_answer(subject: ChoiceSubject) -> Picking:
     """Return the choices of a person: the options, as texts or pictures."""
-    options = subject.question.options
-    is_ordering = subject.question.subtask == "OR"
+    options, is_ordering = subject.question.options, subject.question.subtask == "OR"
     picked = len(options) if is_ordering else 1
     choices = tuple(
         Choice(letter, labels=(letter,)) if is_picture_option(option) else Choice(letter, option)
@@ -407,13 +386,9 @@ class Vqa(Track):
     baselines = CHOICE_RULES
     by_hand = staticmethod(pick_answer)
     record = ChoiceRecord
-    varies = ("prompt", "background", "repeats")
     counted = COUNTS
-    results: ClassVar = {
-        "code": {"accuracy": {"chance": _guessing}},
-        "cells": _run_cells,
-        "part_names": {str(short): name for short, name in SUBTASK_NAMES.items()},
-    }
+    results: ClassVar = {"cells": cells_of, "chance": _guessing, "part_names": SUBTASK_NAMES}
+    varies = ("prompt", "background", "repeats")
     spec: VqaSpec
 
     def open(self) -> None:

@@ -19,7 +19,13 @@ from phyblock.parsing.move import MoveProblem, ParsedMove, move_form, parse_move
 from phyblock.parsing.text import AnswerForm
 from phyblock.records.record import AskedTurn, Course, Line, Record, Reply, SentPrompt, Whole
 from phyblock.scoring.plan import ERROR_TYPES
-from phyblock.scoring.steps import Assembly, MoveOutcome, attempted_counts, placed_counts
+from phyblock.scoring.steps import (
+    MOVE_OUTCOMES,
+    Assembly,
+    MoveOutcome,
+    attempted_counts,
+    placed_counts,
+)
 from phyblock.sim.dynamics import DEFAULT_TRIAL, ONE_SETTING, settle
 from phyblock.sim.engine import described_engine
 from phyblock.sim.pictures import goal_style
@@ -29,7 +35,7 @@ from phyblock.tracks.full_planning import POSE_COUNTS, PlanParse, PlanSubject
 from phyblock.tracks.goal_blind import blind_guesses
 from phyblock.tracks.measures import SampleCounts
 from phyblock.tracks.picking import Choice, Picking, candidate_choices
-from phyblock.tracks.pictures import Drawing, picture_style
+from phyblock.tracks.pictures import Drawing, Workshop, picture_style
 from phyblock.tracks.prompts import TemplatePrompt
 from phyblock.types import Gating, Physics, Setting
 
@@ -158,8 +164,18 @@ class StepSubject(PlanSubject):
     step: int = 0
 
 
-def _random_step(subject: StepSubject, rng: np.random.Generator) -> str:
+def step_text(index: int | None) -> str:
+    """Return one operation in the reply form of the benchmark; None is Done."""
+    return "Next plan: Done" if index is None else f"Next plan: Move({index})"
+
+
+def _random(subject: StepSubject, rng: np.random.Generator) -> str:
     return step_text(int(rng.integers(1, len(subject.candidates) + 1)))
+
+
+def _repeat(subject: StepSubject, rng: np.random.Generator) -> str:
+    failed = subject.last_failed
+    return _random(subject, rng) if failed is None else step_text(failed)
 
 
 def _right_move(
@@ -196,20 +212,11 @@ def _in_turn(plan_of: Callable[[StepSubject], Sequence[int]]) -> Callable[..., s
     return rule
 
 
-def step_text(index: int | None) -> str:
-    """Return one operation in the reply form of the benchmark; None is Done."""
-    return "Next plan: Done" if index is None else f"Next plan: Move({index})"
-
-
 STEP_RULES: Mapping[str, Callable[..., str]] = {
-    "random": _random_step,
+    "random": _random,
     "oracle": _right_move(lambda *_: None),
     "oracle-no-orientation": _right_move(_turned),
-    "repeat": lambda subject, rng: (
-        _random_step(subject, rng)
-        if subject.last_failed is None
-        else step_text(subject.last_failed)
-    ),
+    "repeat": _repeat,
     "all-candidates": _in_turn(lambda subject: range(1, len(subject.candidates) + 1)),
     "goal-blind": _in_turn(lambda subject: subject.guess().steps),
     "color-areas": _in_turn(lambda subject: subject.guess(sees_colors=True).steps),
@@ -233,13 +240,11 @@ def pick_step(subject: StepSubject) -> Picking:
     )
 
 
-_FORMAT: Mapping[str, str] = {
+_REASONS: Mapping[str, str] = {
     "empty": "the answer was empty",
     "thoughts_only": "the answer was empty",
     "no_move": "no operation could be read",
     "several_moves": "more than one operation was given",
-}
-_REASONS: Mapping[str, str] = {
     "shape_not_in_gt": "the goal has no block of this type and color",
     "overflow": "every such block of the goal is already placed",
     "incorrect_orientation": "no such block that is missing has this orientation",
@@ -260,25 +265,16 @@ class PastStep:
         """The named candidate, if any."""
         return self.operation if isinstance(self.operation, int) else None
 
-    @property
-    def text(self) -> str:
-        """The operation as prompts name it."""
-        named = isinstance(self.operation, int)
-        return f"Move({self.operation})" if named else str(self.operation or "(no operation)")
-
     def report(self, feedback: Feedback) -> str:
         """Return the message to the model about the step."""
         if feedback == "none":
             return ""
         if self.outcome == "placed":
             return "it worked, the block is placed"
-        why = _FORMAT.get(self.outcome, "")
-        if feedback == "error_type":
-            why = why or _REASONS[self.outcome]
-        return f"it failed, {why}" if why else "it failed, nothing was placed"
+        if self.outcome in MOVE_OUTCOMES and feedback == "success":
+            return "it failed, nothing was placed"
+        return f"it failed, {_REASONS[self.outcome]}"
 
-
-_LIKELY = PastStep(1, "placed")
 
 STEP_OUTCOMES = ("placed", *ERROR_TYPES, "invalid", "unread", "done")
 """Outcomes of steps in tables; `unread` are replies without a single parsed operation."""
@@ -294,23 +290,16 @@ def _episodes(record: EpisodeRecord) -> tuple[int, ...]:
     return (*numbers, *ended, *(taken[name] for name in STEP_OUTCOMES))
 
 
+_EPISODES = (
+    *("completed", "episodes", "steps", "finishing", "fewest"),
+    *(f"ended_{name}" for name in ENDINGS),
+    *(f"step_{name}" for name in STEP_OUTCOMES),
+)
 COUNTS = (
     SampleCounts(
-        "moves",
-        ("tp", "fp", "fn"),
-        score=lambda score: (score.tp, score.fp, score.fn),
-        same=_SAME,
+        "moves", ("tp", "fp", "fn"), score=lambda one: (one.tp, one.fp, one.fn), same=_SAME
     ),
-    SampleCounts(
-        "episodes",
-        (
-            *("completed", "episodes", "steps", "finishing", "fewest"),
-            *(f"ended_{name}" for name in ENDINGS),
-            *(f"step_{name}" for name in STEP_OUTCOMES),
-        ),
-        record=_episodes,
-        same=_SAME,
-    ),
+    SampleCounts("episodes", _EPISODES, record=_episodes, same=_SAME),
     POSE_COUNTS,
 )
 
@@ -351,16 +340,17 @@ class StepPlanning(SceneTrack):
         return move_form(len(item.candidates), reasons=self.spec.cot)
 
     def start(
-        self, item: AssemblyTask, seed: int, params: Mapping[str, object], *, with_messages: bool
+        self,
+        item: AssemblyTask,
+        seed: int,
+        params: Mapping[str, object],
+        *,
+        with_messages: bool,
+        earlier: Record | None = None,
     ) -> StepEpisode:
-        """Return an episode that has not begun."""
-        return StepEpisode(self, item, seed, params, with_messages=with_messages)
-
-    def again(self, item: AssemblyTask, record: Record) -> StepEpisode:
-        """Return the episode of a record before its first reply; the same blocks fall as then."""
-        turns = record.turns if isinstance(record, EpisodeRecord) else ()
-        fell = {turn.world: turn.fallen for turn in turns if turn.outcome == "placed"}
-        return StepEpisode(self, item, record.seed, {}, with_messages=False, fell=fell)
+        """Return an episode that has not begun; the same blocks fall as in an `earlier` record."""
+        ask = functools.partial(self.asked, item, seed, params)
+        return StepEpisode(self, item, ask, self.shop if with_messages else None, earlier)
 
     def outlines(self, item: AssemblyTask) -> Iterator[Request]:
         """Yield as many requests as an episode can have, made without rendering.
@@ -373,7 +363,8 @@ class StepPlanning(SceneTrack):
                 fixed = self.shop.outlines(self.drawings(item))
                 (current,) = self.shop.outlines((self.draw_state(item, ()),))
                 current = replace(current, data=b"") if step else current
-                messages = self.messages(item, (*fixed, current), [_LIKELY] * step)
+                past = [PastStep(1, "placed")] * step
+                messages = self.messages(item, (*fixed, current), past)
             yield self.asked(item, 0, {}, messages, turn=step + 1)
 
     def messages(
@@ -381,23 +372,23 @@ class StepPlanning(SceneTrack):
     ) -> tuple[Message, ...]:
         """Return the messages of the step after `past`, whose history they contain as text."""
         assert isinstance(self.prompt, TemplatePrompt)
-        spec, reports = self.spec, [one.report(self.spec.feedback) for one in past]
+        history = []
+        for step, one in enumerate(past, 1):
+            named = f"Move({one.move})" if one.move is not None else one.operation
+            told = one.report(self.spec.feedback)
+            history.append({"step": step, "operation": named or "(no operation)", "told": told})
         facts: dict[str, object] = {
             **self.facts(item, pictures),
             "step": len(past) + 1,
-            "max_steps": spec.most_steps(len(item.scene)),
-            "cot": spec.cot,
-            "gating": spec.gating,
+            "max_steps": self.spec.most_steps(len(item.scene)),
+            "cot": self.spec.cot,
+            "gating": self.spec.gating,
             "setting": self.accepts,
-            "told": reports[-1] if reports else "",
-            "history": [
-                {"step": number, "operation": one.text, "told": report}
-                for number, (one, report) in enumerate(zip(past, reports, strict=True), 1)
-            ],
+            "told": history[-1]["told"] if history else "",
+            "history": history,
         }
-        return self.prompt.messages(
-            pictures, {**facts, "answer": self.prompt.text("answer", facts)}
-        )
+        facts["answer"] = self.prompt.text("answer", facts)
+        return self.prompt.messages(pictures, facts)
 
     async def fallen(self, blocks: tuple[Block, ...]) -> tuple[int, ...]:
         """Return the orders of blocks that fall when all are released at their goal poses."""
@@ -417,137 +408,124 @@ class StepPlanning(SceneTrack):
 class StepEpisode:
     """Asks for one operation after another until the goal is complete or a limit is reached.
 
-    Falls are simulated, or given by `fell`: the orders of fallen blocks by the placed vertices.
+    Falls are simulated, or the same as in an `earlier` record of the episode.
     """
 
     def __init__(
         self,
         track: StepPlanning,
         task: AssemblyTask,
-        seed: int,
-        params: Mapping[str, object],
-        *,
-        with_messages: bool,
-        fell: Mapping[tuple[int, ...], tuple[int, ...]] | None = None,
+        ask: Callable[..., Request],
+        shop: Workshop | None,
+        earlier: Record | None = None,
     ) -> None:
-        self.ending: Ending | None = None
-        self._track, self._spec, self._task = track, track.spec, task
-        self._seed, self._params, self._fell = seed, params, fell
-        self._shop = track.shop if with_messages else None
-        self._assembly = Assembly(task.scene, task.candidates, track.accepts, self._spec.gating)
+        self._track, self._task, self._ask, self._shop = track, task, ask, shop
+        self._assembly = Assembly(task.scene, task.candidates, track.accepts, track.spec.gating)
+        self._ending: Ending | None = None
         self._turns: list[dict[str, Any]] = []
+        self._past: list[PastStep] = []
+        self._fell: dict[tuple[int, ...], tuple[int, ...]] | None = None
+        if isinstance(earlier, EpisodeRecord):
+            placed = (turn for turn in earlier.turns if turn.outcome == "placed")
+            self._fell = {turn.world: turn.fallen for turn in placed}
 
     async def request(self) -> Request | None:
-        """Return the next request, or None when the episode has ended."""
-        await self._settle()
-        if self.ending is not None:
-            return None
+        """Return the next request, or None when the episode has ended.
+
+        After a step that placed a block, all are released; blocks that fall are put back, or end
+        the episode.
+        """
         track, task, assembly = self._track, self._task, self._assembly
+        blocks = tuple(task.scene.blocks[vertex] for vertex in assembly.vertices)
+        last = self._turns[-1] if self._turns else {}
+        if last.get("outcome") == "placed" and track.spec.physics != "off":
+            if "fallen" not in last and self._fell is None:
+                last["fallen"] = list(await track.fallen(blocks))
+            elif "fallen" not in last and self._fell is not None:
+                last["fallen"] = list(self._fell.get(assembly.vertices, ()))
+            if last["fallen"] and track.spec.physics == "strict":
+                self._ending = "collapsed"
+        if self._ending is not None:
+            return None
         messages: tuple[Message, ...] = ()
         if self._shop is not None:
-            drawings = (*track.drawings(task), track.draw_state(task, self._blocks()))
-            messages = track.messages(task, await self._shop.images(drawings), self._past())
+            drawings = (*track.drawings(task), track.draw_state(task, blocks))
+            messages = track.messages(task, await self._shop.images(drawings), self._past)
+        failed = last.get("outcome", "placed") != "placed"
         subject = StepSubject(
             task.scene,
             task.candidates,
             functools.partial(track.guess, task),
             assembly.right_moves(),
             assembly.exact_moves(),
-            next((step.move for step in self._failed()), None),
+            self._past[-1].move if failed else None,
             len(self._turns),
         )
-        turn = len(self._turns) + 1
-        return track.asked(task, self._seed, self._params, messages, subject, turn)
+        return self._ask(messages, subject, len(self._turns) + 1)
 
     def take(self, reply: Reply, prompt: SentPrompt | None = None) -> None:
         """Take the step named in the reply to the last request."""
-        parsed = parse_move(reply.text)
-        move = None if parsed.move is None else self._assembly.move(parsed.move)
+        parsed, assembly, spec = parse_move(reply.text), self._assembly, self._track.spec
+        move = None if parsed.move is None else assembly.move(parsed.move)
         outcome: StepOutcome = parsed.problem or ("done" if move is None else move.outcome)
+        operation = "Done" if parsed.is_done else parsed.move
+        self._past.append(PastStep(operation, outcome))
         turn: dict[str, Any] = {
-            "n": len(self._turns) + 1,
+            "n": len(self._past),
             "reply": reply,
             "prompt": prompt,
-            "parse": {
-                "rule": parsed.rule,
-                "move": "Done" if parsed.is_done else parsed.move,
-                "problem": parsed.problem,
-            },
+            "parse": {"rule": parsed.rule, "move": operation, "problem": parsed.problem},
             "outcome": outcome,
             "placed": None if move is None else move.vertex,
         }
         if move is not None:
             turn["swapped"] = [list(pair) for pair in move.swapped]
-        self._turns.append({**turn, "world": list(self._assembly.vertices)})
-        if self._assembly.is_complete:
-            self.ending = "completed"
+        self._turns.append({**turn, "world": list(assembly.vertices)})
+        failed = [*takewhile(lambda step: step.outcome != "placed", reversed(self._past))]
+        same = takewhile(lambda one: one.move is not None and one.move == failed[0].move, failed)
+        limits: tuple[tuple[Ending, int, int | None], ...] = (
+            ("max_repeats", len([*same]), spec.max_repeats),
+            ("max_failures", len(failed), spec.max_failures),
+            ("max_steps", len(self._past), spec.most_steps(len(self._task.scene))),
+        )
+        if assembly.is_complete:
+            self._ending = "completed"
+        elif outcome == "done":
+            self._ending = "done"
         else:
-            self.ending = "done" if outcome == "done" else self._limit()
+            reached = (name for name, n, most in limits if most is not None and n >= most)
+            self._ending = next(reached, None)
 
     def judgement(self) -> Judgement:
-        """Return the fields of the episode; it is parsed if any operation was."""
-        outcomes = [turn["outcome"] for turn in self._turns]
-        plan = [step.move for step in self._past() if step.move is not None]
-        settings = self._track.suite.settings
+        """Return the fields of the episode; it is parsed if any operation was.
+
+        Scores count the blocks in the world (`placed`), and every attempted move.
+        """
+        scene, assembly = self._task.scene, self._assembly
+        plan = [step.move for step in self._past if step.move is not None]
+        happened = Counter(step.outcome for step in self._past)
+        errors = {name: happened[name] for name in ERROR_TYPES}
+        on_ground: list[int] = []
+        if self._ending == "collapsed":
+            fell = next(turn["fallen"] for turn in reversed(self._turns) if turn.get("fallen"))
+            on_ground = [v for v in assembly.vertices if scene.blocks[v].order in fell]
+        scores = []
+        for setting in self._track.suite.settings:
+            chosen, candidates = assembly.chosen, self._task.candidates
+            placed = placed_counts(scene, candidates, setting, chosen, on_ground)
+            attempted = attempted_counts(placed, len(plan))
+            for name, counts, wrong in (("placed", placed, None), ("attempted", attempted, errors)):
+                about = {"criterion": name, "matcher": None, "setting": setting}
+                of = {"tp": counts.tp, "fp": counts.fp, "fn": counts.fn, "errors": wrong}
+                scores.append({**about, **of})
         fields = {
             "parse": {"parser": "move", "rule": None, "plan": plan, "dropped": []},
-            "scores": [one for setting in settings for one in self._scores(setting, len(plan))],
-            "ending": self.ending or "unanswered",
-            "outcomes": outcomes,
+            "scores": scores,
+            "ending": self._ending or "unanswered",
+            "outcomes": [step.outcome for step in self._past],
             "turns": list(self._turns),
         }
         return Judgement(any(turn["parse"]["problem"] is None for turn in self._turns), fields)
-
-    def _past(self) -> list[PastStep]:
-        return [PastStep(turn["parse"]["move"], turn["outcome"]) for turn in self._turns]
-
-    def _failed(self) -> Iterator[PastStep]:
-        """Yield the steps since the last one that placed a block, newest first."""
-        return takewhile(lambda step: step.outcome != "placed", reversed(self._past()))
-
-    def _limit(self) -> Ending | None:
-        """Return the first limit of the suite that is reached, or None."""
-        spec, moves = self._spec, [step.move for step in self._failed()]
-        same = takewhile(lambda move: move is not None and move == moves[0], moves)
-        reached: tuple[tuple[Ending, int, int | None], ...] = (
-            ("max_repeats", len(list(same)), spec.max_repeats),
-            ("max_failures", len(moves), spec.max_failures),
-            ("max_steps", len(self._turns), spec.most_steps(len(self._task.scene))),
-        )
-        return next((name for name, n, most in reached if most is not None and n >= most), None)
-
-    async def _settle(self) -> None:
-        """Release the assembly after a step; blocks that fall are put back, or end the episode."""
-        last = self._turns[-1] if self._turns else {}
-        if last.get("outcome") != "placed" or "fallen" in last or self._spec.physics == "off":
-            return
-        if self._fell is None:
-            fallen = await self._track.fallen(self._blocks())
-        else:
-            fallen = self._fell.get(tuple(self._assembly.vertices), ())
-        last["fallen"] = list(fallen)
-        if fallen and self._spec.physics == "strict":
-            self.ending = "collapsed"
-
-    def _blocks(self) -> tuple[Block, ...]:
-        return tuple(self._task.scene.blocks[vertex] for vertex in self._assembly.vertices)
-
-    def _scores(self, setting: Setting, n_tried: int) -> Iterator[dict[str, Any]]:
-        """Yield counts over the blocks in the world, and over every attempted move."""
-        scene, assembly = self._task.scene, self._assembly
-        on_ground: list[int] = []
-        if self.ending == "collapsed":
-            fell = next(turn["fallen"] for turn in reversed(self._turns) if turn.get("fallen"))
-            on_ground = [v for v in assembly.vertices if scene.blocks[v].order in fell]
-        placed = placed_counts(scene, self._task.candidates, setting, assembly.chosen, on_ground)
-        happened = Counter(turn["outcome"] for turn in self._turns)
-        errors = {name: happened[name] for name in ERROR_TYPES}
-        for criterion, counts, wrong in (
-            ("placed", placed, None),
-            ("attempted", attempted_counts(placed, n_tried), errors),
-        ):
-            of = {"tp": counts.tp, "fp": counts.fp, "fn": counts.fn, "errors": wrong}
-            yield {"criterion": criterion, "matcher": None, "setting": setting, **of}
 
 
 TRACK = StepPlanning

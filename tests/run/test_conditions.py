@@ -6,7 +6,7 @@ import yaml
 
 from phyblock.data.scenes import read_builtin
 from phyblock.sim.pictures import PictureStyle, candidates_png, goal_png
-from phyblock.tracks.base import presented, shown_order
+from phyblock.tracks.base import presented
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import plan_text
@@ -72,7 +72,7 @@ def check_records(records, tasks):
     assert len(records) == 20
     for record in records:
         task, plan = tasks[record["scene"]], record["parse"]["plan"]
-        order = shown_order(task, record["seed"])
+        order = presented(task, record["seed"], "shuffled").order
         assert record["shown"] == {"order": list(order), "blind": False}
         looks = [task.candidates[order[n - 1]].look for n in plan]
         assert looks == [block.look for block in task.scene.blocks]
@@ -126,7 +126,7 @@ def test_episodes_are_shuffled_and_blind_as_well(workspace):
     assert "The strongest baseline here that never sees the goal is" in done.out
     tasks = tasks_of(workspace)
     for record in workspace.records():
-        order = shown_order(tasks[record["scene"]], record["seed"])
+        order = presented(tasks[record["scene"]], record["seed"], "shuffled").order
         assert record["shown"] == {"order": list(order), "blind": True}
         plan = record["parse"]["plan"]
         if record["model"] == "all-candidates":

@@ -20,7 +20,7 @@ from phyblock.results.load import load_run, track_measures
 from phyblock.results.tables import write_tables
 from phyblock.run.rescore import rescore
 from phyblock.scoring.plan import mean_of, ratio_of
-from phyblock.tracks.base import Judgement, SceneTrack, kind_of
+from phyblock.tracks.base import Judgement, SceneTrack
 from phyblock.tracks.full_planning import FullPlanning
 from phyblock.tracks.measures import LayoutColumn, Measure, SampleCounts, TrackReport
 from phyblock.web.board import SiteRun, Sources, board_of, entries_of, values_of
@@ -114,14 +114,6 @@ def test_a_name_that_is_taken_is_refused(more):
     assert kind not in registry.known_tracks().values()
 
 
-@pytest.mark.parametrize("track", sorted(registry.known_tracks()))
-def test_a_track_counts_all_that_its_own_measures_need(track):
-    """A measure in the report whose counts the kind does not name would never be counted."""
-    kind = kind_of(track)
-    needed = {one.counted for one in kind.report().measures if one.counted.sample is not None}
-    assert needed == {one for one in kind.counted if one.sample is not None}
-
-
 def count_blocks(item, record):
     off = abs((record.parse["number"] or 0) - len(item.scene))
     return off, off == 0, 1
@@ -145,7 +137,6 @@ class Counting(SceneTrack):
         "oracle": lambda task, _: str(len(task.scene)),
         "random": lambda _, rng: str(np.random.Generator.integers(rng, 5, 9)),
     }
-    counted = (COUNTS,)
 
     @classmethod
     def report(cls):

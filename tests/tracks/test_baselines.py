@@ -117,7 +117,7 @@ def test_what_is_learned_from_shares_no_base_scene_with_what_is_answered():
     folds = Folds(found)
     for fold in range(FOLDS):
         held_out = {base for q in found if folds.of(q) == fold for base in q.scene.parents[:1]}
-        known = folds.known(fold, "SH")
+        known = [question for question in found if folds.is_known(fold, question)]
         assert held_out
         assert known
         assert all(held_out.isdisjoint(question.scene.parents) for question in known)

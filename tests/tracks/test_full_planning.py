@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import phyblock
 from phyblock.domain.scene import AssemblyTask, Block, Candidate, CandidateSet, Plan, Scene
 from phyblock.tracks.base import presented
-from phyblock.tracks.full_planning import pose_choices, pose_counts
+from phyblock.tracks.full_planning import pose_counts
 from phyblock.tracks.goal_blind import goal_blind_plans
 from tests.tracks.conftest import track_of
 from tests.workspace import plan_text
@@ -107,16 +107,19 @@ plans = st.lists(st.integers(-1, 9), max_size=10)
     ],
 )
 def test_the_first_pose_named_of_a_kind_counts(plan, counts):
-    task = AssemblyTask(SCENE, CANDIDATES)
-    assert pose_counts(task, SimpleNamespace(parse=SimpleNamespace(plan=plan))) == counts
+    assert counted_poses(CANDIDATES, plan) == counts
+
+
+def counted_poses(candidates, plan):
+    record = SimpleNamespace(parse=SimpleNamespace(plan=plan))
+    return pose_counts(AssemblyTask(SCENE, candidates), record)
 
 
 @given(plans, st.permutations(range(1, 8)))
 def test_the_order_of_the_list_moves_choices_between_first_and_later_alone(plan, order):
     shown = CandidateSet(tuple(CANDIDATES[number] for number in order))
     there = [order.index(n) + 1 if 1 <= n <= 7 else n for n in plan]
-    here = sorted(is_right for _, is_right in pose_choices(AssemblyTask(SCENE, CANDIDATES), plan))
-    assert here == sorted(
-        is_right for _, is_right in pose_choices(AssemblyTask(SCENE, shown), there)
-    )
-    assert len(here) <= len(set(plan))
+    counts = [counted_poses(*one) for one in ((CANDIDATES, plan), (shown, there))]
+    (right, asked), again = [(a + c, b + d) for a, b, c, d in counts]
+    assert (right, asked) == again
+    assert right <= asked <= len(set(plan))
