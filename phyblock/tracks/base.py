@@ -130,8 +130,8 @@ class Track(ABC):
         self.is_blind = isinstance(self.spec, PictureControls) and self.spec.blind
         self.prompt = None if shop is None else self.open_prompt()
         self._drawings: dict[tuple[object, ...], tuple[Drawing, ...]] = {}
-        added = (measure.counted for measure in added_measures(self.name))
-        self._counted: tuple[SampleCounts, ...] = (*self.counted, *added)
+        measures = (*self.report().measures, *added_measures(self.name))
+        self._counted = dict.fromkeys(measure.counted for measure in measures)
         self.open()
 
     @abstractmethod
@@ -243,11 +243,6 @@ class Track(ABC):
             for one in self._counted
             if one.sample is not None
         }
-
-    @functools.cached_property
-    def _counted(self) -> Sequence[SampleCounts]:
-        measures = (*self.report().measures, *added_measures(self.name))
-        return tuple(dict.fromkeys(measure.counted for measure in measures))
 
     async def judge_apart(self, item: Any, text: str | None, _earlier: Record | None) -> Judgement:
         """Return the result of `judge`, computed in another process if it takes long.
