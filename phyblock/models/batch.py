@@ -168,10 +168,11 @@ class BatchModel:
         try:
             await asyncio.shield(batch.work)
             reply = None if batch.answers is None else await self._read(key, request, batch)
-        except UnavailableError:
+        except UnavailableError as error:
+            self._refusal = self._refusal or error
             # This command gets no more news of batches in progress: they count as spent.
             for each in self._batches:
-                # A draft was never sent.
+                # A draft is not sent any more.
                 self._settle_all(each, 0.0 if each.event is None else None)
             raise
         except ModelError as error:
@@ -271,6 +272,8 @@ class BatchModel:
             ):
                 await asyncio.sleep(short_s / 4)
             self._draft = None if self._draft is batch else self._draft
+            if self._refusal is not None:
+                raise self._refusal
             sending = asyncio.ensure_future(self._send(batch))
             try:
                 await asyncio.shield(sending)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import math
 import time
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -188,20 +189,21 @@ _TOO_MUCH = (429, 529)
 
 @dataclass(eq=False)
 class Server:
-    """One server, which failed `failures` times in a row, first at `failing_since_s` and last at
-    `failed_at_s`, and is not asked before `cool_at_s`; `refusal` is the reason why it is not used
-    any more.
+    """One server with its requests `under_way`, and how often it was chosen.
+
+    It failed `failures` times in a row, first at `failing_since_s`, and is not asked before
+    `cool_at_s`, nor while it `is_tried`; `refusal` is the reason why it is not used any more.
     """
 
     name: str
     client: Client
     under_way: int = 0
-    sent: int = 0
+    chosen: int = 0
     was_heard: bool = False
     failures: int = 0
     failing_since_s: float = 0.0
-    failed_at_s: float = float("-inf")
     cool_at_s: float = float("-inf")
+    is_tried: bool = False
     refusal: UnavailableError | None = None
 
 
@@ -210,9 +212,9 @@ class Servers:
     """Chooses among the servers of a model: the least loaded one that is not cooling down.
 
     A server cools down after two failed or lost connections or gateway errors (502, 503, 504) in a
-    row, longer with each further one, and after a 429 or 529, always for its `Retry-After` at
-    least. A timeout shows nothing: some requests are slow. `report` is called with a sentence on a
-    server that is not used any more.
+    row, longer with each further one, and gets one request at a time until it answers. It also
+    does after a 429 or 529, always for its `Retry-After` at least. A timeout shows nothing: some
+    requests are slow. `report` is called with a sentence on a server that is not used any more.
     """
 
     all: tuple[Server, ...]
@@ -228,25 +230,31 @@ class Servers:
 
     def cooling_s(self) -> float:
         """Return the seconds until a server may be asked; raises UnavailableError as `usable`."""
-        return max(0.0, min(s.cool_at_s for s in self.usable()) - self.policy.clock.now())
+        return min(map(self._rests_s, self.usable()))
 
-    def pick(self, failed: Server | None = None) -> Server:
-        """Return the server to ask. One that just `failed` the request is the last choice.
+    def _rests_s(self, server: Server) -> float:
+        if server.is_tried:
+            return math.inf
+        return max(0.0, server.cool_at_s - self.policy.clock.now())
 
-        A server that is away gets single requests at growing distances until it answers.
+    @contextlib.contextmanager
+    def chosen(self, failed: Server | None = None) -> Iterator[Server]:
+        """Hold a place at the server to ask. One that just `failed` the request is the last choice.
+
+        It is chosen when the request is admitted, so that a server that is away gets only one.
         """
-        now_s = self.policy.clock.now()
-        chosen = min(
-            self.usable(),
-            key=lambda s: (max(0.0, s.cool_at_s - now_s), s is failed, s.under_way, s.sent),
+        server = min(
+            self.usable(), key=lambda s: (self._rests_s(s), s is failed, s.under_way, s.chosen)
         )
-        if chosen.failures > 1:
-            chosen.cool_at_s = max(chosen.cool_at_s, now_s + self._rest_s(chosen))
-        return chosen
-
-    def _rest_s(self, server: Server) -> float:
-        """Return how long a server that is away is not asked again [s]."""
-        return min(self.policy.base_s * (server.failures - 1), self.policy.max_wait_s)
+        is_trial = server.failures > 1 and not server.is_tried
+        server.is_tried |= is_trial
+        server.chosen += 1
+        server.under_way += 1
+        try:
+            yield server
+        finally:
+            server.under_way -= 1
+            server.is_tried &= not is_trial
 
     def failed(self, server: Server, error: ModelError, sent_s: float) -> None:
         """Record that a request sent at `sent_s` failed.
@@ -257,15 +265,15 @@ class Servers:
         policy, now_s = self.policy, self.policy.clock.now()
         server.was_heard |= error.status is not None
         is_down = error.sent in ("no", "lost") or error.status in _GATEWAY
-        if is_down and (sent_s >= server.cool_at_s or sent_s > server.failed_at_s):
+        if is_down and sent_s >= server.cool_at_s:
             # Others that were sent before it failed last show nothing new.
-            server.failed_at_s = now_s
             server.failing_since_s = server.failing_since_s if server.failures else now_s
             server.failures += 1
         elif not is_down and error.sent == "answered":
             server.failures = 0
         if is_down or error.status in _TOO_MUCH:
-            wait_s = self._rest_s(server) if is_down else policy.base_s
+            times = server.failures - 1 if is_down else 1
+            wait_s = min(policy.base_s * times, policy.max_wait_s)
             until_s = now_s + max(wait_s, policy.followed_s(error))
             server.cool_at_s = max(server.cool_at_s, until_s)
         lasted_s = now_s - server.failing_since_s
@@ -308,6 +316,8 @@ class ChatModel:
     policy: RetryPolicy
     report: Report
     needs_messages: bool = field(default=True, init=False)
+    under_way: int = field(default=0, init=False)
+    """Number of requests that were sent and have not ended."""
 
     def __post_init__(self) -> None:
         self.name = self.config.name
@@ -332,11 +342,6 @@ class ChatModel:
             self.cache.put(key, self.config.id, reply)
             return reply
 
-    @property
-    def under_way(self) -> int:
-        """Number of requests without an answer yet."""
-        return sum(server.under_way for server in self.servers.all)
-
     async def aclose(self) -> None:
         """Release connections."""
         for server in self.servers.all:
@@ -353,22 +358,23 @@ class ChatModel:
 
     async def _attempt(self, call: _Call) -> Reply:
         """Send once, when limits and budget have room."""
-        held = None
-        async with self.limits.slot(call.expected.most_tokens):
-            if self.budget.tariff is not None:
-                held = await self.budget.reserve(lambda: self.budget.most_usd(call.expected) or 0.0)
-            exchange = asyncio.ensure_future(self._exchange(call, held))
-            try:
-                return await asyncio.shield(exchange)
-            except asyncio.CancelledError:
-                call.is_cancelled = True
+        held, expected = None, call.expected
+        async with self.limits.slot(expected.most_tokens):
+            with self.servers.chosen(call.failed_at) as server:
+                if self.budget.tariff is not None:
+                    held = await self.budget.reserve(lambda: self.budget.most_usd(expected) or 0.0)
+                exchange = asyncio.ensure_future(self._exchange(call, server, held))
                 try:
-                    return await exchange
-                except RetryableError:
-                    # It would otherwise be sent again.
-                    raise asyncio.CancelledError from None
+                    return await asyncio.shield(exchange)
+                except asyncio.CancelledError:
+                    call.is_cancelled = True
+                    try:
+                        return await exchange
+                    except RetryableError:
+                        # It would otherwise be sent again.
+                        raise asyncio.CancelledError from None
 
-    async def _exchange(self, call: _Call, held: Reservation | None) -> Reply:
+    async def _exchange(self, call: _Call, server: Server, held: Reservation | None) -> Reply:
         """Write that a call is sent, send it, and write its end.
 
         A failure that may have been billed counts in full; a failure before anything is sent, and
@@ -384,7 +390,7 @@ class ChatModel:
                 if call.is_cancelled:
                     raise asyncio.CancelledError
             spent_usd = None
-            reply = await self._complete(call)
+            reply = await self._complete(call, server)
             spent_usd = cost_usd(self.budget.tariff, reply)
             reply = reply.model_copy(update={"cost_usd": spent_usd, "attempts": call.sent})
             self.budget.learn(call.expected, reply.usage)
@@ -414,12 +420,11 @@ class ChatModel:
                 await self.journal.ended(written, spent_usd, reply)
         return reply
 
-    async def _complete(self, call: _Call) -> Reply:
-        """Send to one of the servers, and record whether it answers."""
-        server, sent_s = self.servers.pick(call.failed_at), self.policy.clock.now()
+    async def _complete(self, call: _Call, server: Server) -> Reply:
+        """Send to a server, and record whether it answers."""
+        sent_s = self.policy.clock.now()
         call.sent += 1
-        server.sent += 1
-        server.under_way += 1
+        self.under_way += 1
         try:
             reply = await server.client.complete(call.request)
         except ModelError as error:
@@ -427,9 +432,7 @@ class ChatModel:
             self.servers.failed(server, error, sent_s)
             raise
         finally:
-            server.under_way -= 1
-        if server.failures > 1:
-            server.cool_at_s = float("-inf")
+            self.under_way -= 1
         server.was_heard, server.failures = True, 0
         return reply
 

@@ -25,6 +25,7 @@ from phyblock.models.cache import ReplyCache
 from phyblock.models.costs import Budget
 from phyblock.records.record import BatchLine, Reply
 from tests.fuzz.strategies import documents
+from tests.models import factory
 from tests.models.factory import (
     QUICK,
     ROUTES,
@@ -229,6 +230,18 @@ def test_a_batch_that_may_exist_stops_the_model_until_it_is_looked_up(route, dis
         assert len(texts(run_command(config, disk, requests))) == 2
     assert once(server, 2)
     assert len(server.made) == 1
+
+
+def test_once_a_model_is_stopped_its_draft_is_not_sent_and_costs_nothing(disk, monkeypatch):
+    monkeypatch.setattr(factory, "POLL_S", 0.25)  # A draft waits for a second.
+    old, new = requests_of(2)
+    with serving("direct", BatchFaults(calls={"look": ("404", "404")})) as (server, config):
+        run_command(config, disk, [old])
+        budget = Budget(1e9)
+        ended = run_command(config, disk, [old, new], budget=budget)
+    assert {type(one) for one in ended} == {UnavailableError}
+    assert len(server.made) == 1
+    assert budget.spent_usd == pytest.approx(disk.lines[0].most_usd[0])
 
 
 def test_a_wrong_key_stops_the_model_and_is_written_nowhere(route, disk):
