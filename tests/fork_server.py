@@ -243,9 +243,8 @@ def serve(orders: socket.socket) -> None:
     from phyblock.records.files import known_records
     from phyblock.results.text import latex_template
 
-    for package in (phyblock.cli, phyblock.making.cli):
-        for module in pkgutil.iter_modules(package.__path__, f"{package.__name__}."):
-            importlib.import_module(module.name)
+    for module in pkgutil.iter_modules(phyblock.cli.__path__, "phyblock.cli."):
+        importlib.import_module(module.name)
     for name in _PRELOADED:
         # Other Pythons have neither PyBullet nor what only development needs.
         with contextlib.suppress(ModuleNotFoundError):

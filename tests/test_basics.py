@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 
 from phyblock.domain.blocks import euler_deg_to_matrix
 from phyblock.errors import ModelError, PhyblockError, StoreError
-from phyblock.making.questions.text_probe import text_features
+from phyblock.making.questions.guesses import text_features
 from phyblock.scoring.pose import Piece, PoseFit, overlap_volume, placed
 from phyblock.sim.geometry import collision_pieces
 from phyblock.text import csv_cell, one_line, plain_sum

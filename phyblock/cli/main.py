@@ -43,8 +43,8 @@ _SECTIONS = {
         "site": (f"{_CLI}.results:site", "Make a leaderboard of runs and bundles."),
     },
     "Data": {
-        "scenes": (f"{_MAKING}.scenes:scenes", "Make, check, show and draw scenes."),
-        "questions": (f"{_MAKING}.questions:questions", "Make, check and show questions."),
+        "scenes": (f"{_MAKING}:scenes", "Make, check, show and draw scenes."),
+        "questions": (f"{_MAKING}:questions", "Make, check and show questions."),
     },
 }
 """Commands by the heading in the help: the place of each (`module:name`), and its help text."""

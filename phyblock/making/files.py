@@ -12,18 +12,19 @@ from phyblock.data.base import VERSION_FILE
 from phyblock.data.questions import StoredQuestion
 from phyblock.data.scenes import StoredScene
 from phyblock.domain.question import LETTERS, SUBTASK_NAMES, SUBTASKS, Question
-from phyblock.domain.scene import CandidateSet, Kind, Scene
+from phyblock.domain.scene import CandidateSet, Scene
 from phyblock.errors import Problem
-from phyblock.files import atomic_write, check_free, make_folder, read_text, writing
+from phyblock.files import atomic_write, check_free, digest_of_file, make_folder, read_text, writing
 from phyblock.making.checks import LEVEL_LIMITS
 from phyblock.making.scenes.sketch import PALETTES, Palette
 from phyblock.sim.engine import other_engine
-from phyblock.text import hex_digest
 
 SUMS_FILE = "SHA256SUMS"
 SCENE_FILES = ("README.md", "scenes.jsonl", VERSION_FILE)
 QUESTION_FILES = ("CARD.md", "questions.jsonl", VERSION_FILE)
 """Card, lines and version of a set."""
+PICTURES = "pictures"
+"""Folder of the pictures of a set of questions that stores them."""
 SCENE_SET_VERSION = 5
 """Increased whenever the same seed makes other scenes or candidate sets: 2 offers distractors as
 often as goals need them, and shows at least 3 % of every block's outline; 3 excludes scenes of the
@@ -44,32 +45,42 @@ def write_scenes(folder: Path, tasks: _Tasks, card: str) -> None:
     """Write scenes with their candidate sets, sorted by id. Raises StoreError if that fails."""
     by_id = sorted(tasks, key=lambda task: task[0].id)
     lines = (StoredScene.of(scene, candidates).as_json() for scene, candidates in by_id)
-    _write(folder, SCENE_FILES, card, lines, SCENE_SET_VERSION)
+    _write(folder, SCENE_FILES, (card, lines, SCENE_SET_VERSION))
 
 
 def write_questions(
-    folder: Path, questions: Sequence[Question], originals: Mapping[str, Scene], card: str
+    folder: Path,
+    questions: Sequence[Question],
+    originals: Mapping[str, Scene],
+    card: str,
+    pictures: Iterable[str] = (),
 ) -> None:
-    """Write questions in their order; `originals` are the scenes as stored, by id."""
+    """Write questions in their order; `originals` are the scenes as stored, by id, and `pictures`
+    the names of files that are there.
+    """
     lines = (StoredQuestion.of(q, originals[q.scene.id]).as_json() for q in questions)
-    _write(folder, QUESTION_FILES, card, lines, QUESTION_SET_VERSION)
+    _write(folder, QUESTION_FILES, (card, lines, QUESTION_SET_VERSION), pictures)
 
 
 def _write(
-    folder: Path, names: Sequence[str], card: str, lines: Iterable[str], version: int
+    folder: Path,
+    names: Sequence[str],
+    content: tuple[str, Iterable[str], int],
+    pictures: Iterable[str] = (),
 ) -> None:
+    card, lines, version = content
     texts = (card, "".join(f"{line}\n" for line in lines), f"{version}\n")
     check_out(folder, names)
     make_folder(folder)
     with writing(folder):
         for name, text in zip(names, texts, strict=True):
             atomic_write(folder / name, text)
-        atomic_write(folder / SUMS_FILE, sums_text(folder, names))
+        atomic_write(folder / SUMS_FILE, sums_text(folder, (*names, *pictures)))
 
 
-def sums_text(folder: Path, names: Sequence[str]) -> str:
+def sums_text(folder: Path, names: Iterable[str]) -> str:
     """Return checksums of files in the format of `sha256sum -c`."""
-    return "".join(f"{hex_digest((folder / name).read_bytes())}  {name}\n" for name in names)
+    return "".join(f"{digest_of_file(folder / name)}  {name}\n" for name in names)
 
 
 def check_sums(folder: Path) -> tuple[int, tuple[Problem, ...]]:
@@ -81,12 +92,15 @@ def check_sums(folder: Path) -> tuple[int, tuple[Problem, ...]]:
     wrong = []
     for line in lines:
         digest, _, name = line.partition("  ")
-        file = folder / name
-        if not file.is_file():
-            wrong.append(Problem(str(file), "is missing"))
-        elif hex_digest(file.read_bytes()) != digest:
-            wrong.append(Problem(str(file), f"differs from its checksum in {SUMS_FILE}"))
+        if not (found := digest_of_file(folder / name)):
+            wrong.append(Problem(str(folder / name), "is missing"))
+        elif found != digest:
+            message = f"differs from its checksum in {SUMS_FILE}"
+            wrong.append(Problem(str(folder / name), message))
     return len(lines), tuple(wrong)
+
+
+# Cards
 
 
 def _card(template: str, /, **facts: object) -> str:
@@ -99,6 +113,22 @@ def _card(template: str, /, **facts: object) -> str:
 def scene_card(name: str, tasks: _Tasks, command: str, palette: Palette, rejected: int) -> str:
     """Return the Markdown card of scenes that `command` generated."""
     scenes, sizes = [scene for scene, _ in tasks], {len(offered) for _, offered in tasks}
+
+    def bases(some: Iterable[Scene]) -> int:
+        return sum(scene.parents == (scene.id,) for scene in some)
+
+    def row(some: Sequence[Scene]) -> list[object]:
+        """Return numbers of scenes and base scenes; mean and most of what they consist of."""
+        cells: list[object] = [len(some), bases(some)]
+        for counts in (
+            [len(scene) for scene in some],
+            [len({block.type for block in scene.blocks}) for scene in some],
+            [len({block.color for block in scene.blocks}) for scene in some],
+            [max(scene.graph.layers) for scene in some],
+        ):
+            cells += [f"{sum(counts) / len(counts):.1f}", max(counts)]
+        return cells
+
     by_level = {n: [one for one in scenes if n in one.levels] for n in LEVEL_LIMITS}
     text = _card(
         "scenes",
@@ -108,8 +138,8 @@ def scene_card(name: str, tasks: _Tasks, command: str, palette: Palette, rejecte
         rejected=rejected,
         count=len(scenes),
         shared=sum(len(scene.levels) > 1 for scene in scenes),
-        base=_bases(scenes),
-        levels=[(n, LEVEL_LIMITS[n], _row(some)) for n, some in by_level.items() if some],
+        base=bases(scenes),
+        levels=[(n, LEVEL_LIMITS[n], row(some)) for n, some in by_level.items() if some],
         palette=palette,
         pairs=len(PALETTES[palette]),
         candidates=" to ".join(map(str, sorted({min(sizes), max(sizes)}))),
@@ -123,29 +153,27 @@ def completed_card(name: str, count: int, command: str) -> str:
     return text + _card("scenes_file")
 
 
-def _bases(scenes: Sequence[Scene]) -> int:
-    return sum(scene.parents == (scene.id,) for scene in scenes)
-
-
-def _row(scenes: Sequence[Scene]) -> list[str]:
-    """Return numbers of scenes, base scenes; mean and maximum of blocks, types, colors, layers."""
-    counts = [
-        (len(one), *(len({kind[i] for kind in _kinds(one)}) for i in (0, 1)), max(one.graph.layers))
-        for one in scenes
-    ]
-    cells = [str(len(scenes)), str(_bases(scenes))]
-    for column in zip(*counts, strict=True):
-        cells += [f"{sum(column) / len(column):.1f}", str(max(column))]
-    return cells
-
-
-def _kinds(scene: Scene) -> set[Kind]:
-    return {block.kind for block in scene.blocks}
-
-
-def question_card(name: str, scenes_name: str, questions: Sequence[Question], command: str) -> str:
+def question_card(
+    name: str,
+    scenes_name: str,
+    questions: Sequence[Question],
+    command: str,
+    *,
+    has_pictures: bool = False,
+) -> str:
     """Return the Markdown card of questions about the scenes of a set, made by `command`."""
-    by_subtask = {s: [q for q in questions if q.subtask == s] for s in SUBTASKS}
+    rows = []
+    for subtask in SUBTASKS:
+        some = [question for question in questions if question.subtask == subtask]
+        if not some:
+            continue
+        counts = (len(some), len({q.scene.id for q in some}), len({q.wording for q in some}))
+        letters = Counter(question.answer[0] for question in some)
+        texts = Counter(question.options[question.answer[0]] for question in some)
+        is_text = texts.keys().isdisjoint(("<img1>", "place A"))
+        most = f"{max(texts.values()) / len(some):.0%}" if is_text else ""
+        shares = (f"{letters[i] / len(some):.0%}" for i in range(len(LETTERS)))
+        rows.append((subtask, SUBTASK_NAMES[subtask], *counts, *shares, most))
     return _card(
         "questions",
         name=name,
@@ -153,20 +181,6 @@ def question_card(name: str, scenes_name: str, questions: Sequence[Question], co
         command=command,
         count=len(questions),
         scenes=len({question.scene.id for question in questions}),
-        rows=[(s, SUBTASK_NAMES[s], *_shares(some)) for s, some in by_subtask.items() if some],
+        rows=rows,
+        pictures=PICTURES if has_pictures else "",
     )
-
-
-def _shares(questions: Sequence[Question]) -> list[object]:
-    """Return numbers of questions, scenes and wordings; shares of the letters, and of the most
-    frequent answer if options are texts.
-    """
-    count = len(questions)
-    letters = Counter(question.answer[0] for question in questions)
-    texts = Counter(question.options[question.answer[0]] for question in questions)
-    most = "" if "<img1>" in texts or "place A" in texts else f"{max(texts.values()) / count:.0%}"
-    return [
-        *(count, len({one.scene.id for one in questions}), len({one.wording for one in questions})),
-        *(f"{letters[i] / count:.0%}" for i in range(len(LETTERS))),
-        most,
-    ]

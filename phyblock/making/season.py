@@ -6,17 +6,19 @@ controls, such as that of a beacon. The seed of the set is a digest of the secre
 
 from __future__ import annotations
 
+import secrets
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import Field
+from pydantic import Field, TypeAdapter
 
 import phyblock
+from phyblock.data.base import read_data
 from phyblock.data.lookup import find_data_set
 from phyblock.data.scenes import SCENES_FILE
 from phyblock.errors import DataError, Problem
-from phyblock.files import bundled_sets
-from phyblock.records.record import Line
+from phyblock.files import atomic_write, bundled_sets, check_free, make_folder, writing
+from phyblock.records.record import Line, decode
 from phyblock.sim.engine import described_engine
 from phyblock.text import hex_digest
 
@@ -34,6 +36,50 @@ class Commitment(Line, extra="forbid"):
     public: str
     """The later public value to use, in words."""
 
+    @classmethod
+    def now(cls, secret: str, arguments: str, public: str) -> Commitment:
+        """Return the commitment to a secret with today's code and engine."""
+        return cls(
+            secret_sha256=hex_digest(secret),
+            code_sha256=code_digest(),
+            engine=described_engine(),
+            arguments=arguments,
+            public=public,
+        )
+
+
+def commit(folder: Path, arguments: str, public: str) -> tuple[Path, Path]:
+    """Write a new secret and the commitment to it, and return the two files."""
+    files = (folder / "secret.txt", folder / "commitment.json")
+    check_free(files, "give another --out")
+    secret = secrets.token_hex(32)
+    commitment = Commitment.now(secret, arguments, public)
+    make_folder(folder)
+    with writing(folder):
+        atomic_write(files[0], f"{secret}\n")
+        files[0].chmod(0o600)
+        atomic_write(files[1], f"{commitment.as_json()}\n")
+    return files
+
+
+def reveal(commitment: Path, secret: Path, public: str) -> tuple[str, int]:
+    """Return the arguments and the seed of a season, whose public value is known.
+
+    Raises DataError for another secret, code or engine than was committed to.
+    """
+    where = str(commitment)
+    committed = decode(TypeAdapter(Commitment), read_data(commitment), where, Commitment)
+    revealed = read_data(secret).decode("ascii", "replace").strip()
+    found = Commitment.now(revealed, committed.arguments, committed.public)
+    problems = [
+        Problem(where, "is not what was committed to", field, getattr(found, field), meant)
+        for field, meant in committed
+        if getattr(found, field) != meant
+    ]
+    if problems:
+        raise DataError(problems)
+    return committed.arguments, int(hex_digest(f"{revealed}\n{public}")[:16], 16)
+
 
 def code_digest() -> str:
     """Return the digest of the package's own files and the built-in scenes, with their names."""
@@ -43,20 +89,3 @@ def code_digest() -> str:
     named = [(name, path) for name, path in named if not name.startswith("bundled/")]
     named += [(name, find_data_set(name) / SCENES_FILE) for name in bundled_sets(SCENES_FILE)]
     return hex_digest("".join(f"{hex_digest(path.read_bytes())} {name}\n" for name, path in named))
-
-
-def season_seed(commitment: Commitment, secret: str, public: str, where: str) -> int:
-    """Return the seed of a season. Raises DataError for another secret, code or engine."""
-    meant = (
-        ("secret_sha256", commitment.secret_sha256, hex_digest(secret)),
-        ("code_sha256", commitment.code_sha256, code_digest()),
-        ("engine", commitment.engine, described_engine()),
-    )
-    problems = [
-        Problem(where, "is not what was committed to", field, found, committed)
-        for field, committed, found in meant
-        if found != committed
-    ]
-    if problems:
-        raise DataError(problems)
-    return int(hex_digest(f"{secret}\n{public}")[:16], 16)

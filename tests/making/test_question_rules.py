@@ -17,14 +17,22 @@ from phyblock.files import bundled
 from phyblock.making.questions.base import WORDINGS, Draft, UnfairError, four_alike, ranks_among
 from phyblock.making.questions.dynamics import (
     STAYS,
+    THIN_M,
+    WIDE_M,
     AffordanceMaker,
+    bench,
     four_plans,
+    free_tops,
+    group_of,
+    is_sure,
+    lowered,
     outcomes_of,
     points_of,
     resting_on,
     stays_at,
 )
-from phyblock.making.questions.production import BALANCE, even_letters, keeping_odds
+from phyblock.making.questions.guesses import keeping_odds
+from phyblock.making.questions.production import BALANCE, even_letters
 from phyblock.making.questions.properties import layers_of, sure_blocks
 from phyblock.making.questions.relations import (
     AXIS_TURNS,
@@ -34,15 +42,6 @@ from phyblock.making.questions.relations import (
     tipped_over,
 )
 from phyblock.making.questions.sight import SHAPE_WORDS, names, resolve, resolve_one
-from phyblock.making.questions.structures import (
-    THIN_M,
-    WIDE_M,
-    bench,
-    free_tops,
-    group_of,
-    is_sure,
-    lowered,
-)
 from phyblock.making.questions.views import ViewpointMaker
 from phyblock.making.scenes.sketch import POSES, transformed
 from phyblock.sim.balance import is_balanced

@@ -14,21 +14,21 @@ import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from phyblock.domain.question import LETTERS, SUBTASKS, Question, QuestionPicture, Subtask
+from phyblock.errors import Problem, SpecError
 from phyblock.making.questions.base import Floats
-from phyblock.making.questions.measures import measures_of
+from phyblock.making.questions.guesses import measures_of, text_features
 from phyblock.making.questions.production import BALANCE
-from phyblock.making.questions.text_probe import text_rule
-from phyblock.tracks.questions import FOLDS, Folds, guesses_of, majority_rule
+from phyblock.tracks.questions import FOLDS, Folds, Rule, guesses_of, majority_rule
 
 GUESSABLE = 0.35
 """Accuracy that no probe of a sound set exceeds, unless chance is within its interval."""
-_FEWEST = 12
-_RIDGE = 4.0
+_FEWEST, _RIDGE = 12, 4.0
+_SEED, _STRENGTH = 0, 0.05
 
 
 class Probe(NamedTuple):
@@ -112,6 +112,39 @@ def audit_questions(questions: Sequence[Question]) -> Iterator[SubtaskAudit]:
             probes=probes,
             repeats=tuple(q.id for q in mine if q.id in repeated),
         )
+
+
+def text_rule(known: Sequence[Question]) -> Rule:
+    """Learn a logistic regression over the words of question and option, their numbers and
+    likeness: the option that it gives the highest odds. An order is the most frequent one.
+
+    Raises SpecError where scikit-learn is not installed.
+    """
+    majority = majority_rule(known)
+    single = [question for question in known if len(question.answer) == 1]
+    if not single:
+        return majority
+    try:
+        from sklearn.feature_extraction import DictVectorizer  # type: ignore[import-untyped]
+        from sklearn.linear_model import LogisticRegression  # type: ignore[import-untyped]
+    except ImportError as error:
+        message = "the text probe needs scikit-learn, which is not installed"
+        problem = Problem("text", message, hint="pip install 'phyblock[audit]'")
+        raise SpecError(problem) from error
+    vectorizer = DictVectorizer()
+    regression = LogisticRegression(C=_STRENGTH, max_iter=1000, random_state=_SEED)
+    rows = [features for q in single for features in text_features(q.text, q.options)]
+    is_right = [index in q.answer for q in single for index in range(len(q.options))]
+    regression.fit(vectorizer.fit_transform(rows), is_right)
+
+    def guess(question: Question) -> tuple[int, ...]:
+        if question.subtask == "OR":
+            return majority(question)
+        rows = vectorizer.transform(text_features(question.text, question.options))
+        odds: Any = regression.decision_function(rows).tolist()
+        return (max(range(len(odds)), key=odds.__getitem__),)
+
+    return guess
 
 
 def duplicates_of(questions: Sequence[Question]) -> dict[str, str]:

@@ -72,6 +72,11 @@ class Draft:
         return self.kind or self.wording
 
     @property
+    def texts(self) -> tuple[str, ...]:
+        """The options as texts; none of pictures and places, whose texts tell nothing."""
+        return tuple(option for option in self.options if isinstance(option, str))
+
+    @property
     def text(self) -> str:
         """The wording with its slots filled."""
         return fill_template(WORDINGS[self.wording], self.slots)

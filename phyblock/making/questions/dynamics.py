@@ -19,65 +19,146 @@ from __future__ import annotations
 import functools
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from phyblock.domain.blocks import COLORS, SHAPES, BlockType
+from phyblock.domain.blocks import COLORS, SHAPES, BlockType, Euler
 from phyblock.domain.question import LETTERS, Mark, Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
 from phyblock.making.questions import base, sight
-from phyblock.making.questions.base import Draft, Floats, Maker, UnfairError, View, pick, shuffled
-from phyblock.making.questions.structures import (
-    SPARE_M,
-    THIN_M,
-    WEIGHTS,
-    WIDE_M,
-    Bench,
-    bench,
-    free_tops,
-    group_of,
-    is_square,
-    is_sure,
-    lots_of,
-    lowered,
-    lowered_round,
-    pillars,
-    stage,
-    stays_round,
-    surely_stays,
-    verdict,
-)
-from phyblock.sim.balance import is_balanced, surely_stands
+from phyblock.making.questions.base import Draft, Floats, Maker, UnfairError, pick, shuffled
+from phyblock.sim import question_pictures as drawn
+from phyblock.sim.balance import MARGIN_M, is_balanced, surely_falls, surely_stands
 from phyblock.sim.camera import view_axes
-from phyblock.sim.contact import GROUND, Turned, bounds_m, support_graph, whole_bounds_m
+from phyblock.sim.contact import (
+    GROUND,
+    Turned,
+    bounds_m,
+    drop_height_m,
+    find_overlaps,
+    support_graph,
+    whole_bounds_m,
+)
 from phyblock.sim.contact import at as at_place
 from phyblock.sim.dynamics import groups
-from phyblock.sim.outcomes import LEAN_DEG, Outcome, after_removal
-from phyblock.sim.question_pictures import (
-    BLOCK_LABEL,
-    MARKS_APART_PX,
-    block_mark,
-    is_inside,
-    mark_pixel,
-    seen,
-    seen_order,
-    shown_pixels,
-)
+from phyblock.sim.geometry import corners_m
+from phyblock.sim.outcomes import LEAN_DEG, after_removal, holds
+from phyblock.sim.question_pictures import is_inside, mark_pixel, seen, shown_pixels
+
+Ints = NDArray[np.int64]
+Lot = frozenset[int]
+"""Orders of blocks that move."""
+_ALL_SEEN = 0.12
+"""The least visible share of every block of a structure."""
+# The support graph is asked again for every block of a structure.
+_below = functools.lru_cache(maxsize=64)(support_graph)
+
+# What statics and simulation say
+
+_LIFT_M, _DIRECTIONS = 0.6, 8
+
+
+def lowered(block: Block, onto: Sequence[Block], x_m: float, y_m: float) -> Block:
+    """Return the block let down, as it is turned, with the middle of its outline over (x, y) [m].
+
+    It stops where it first touches one of the blocks, or the floor.
+    """
+    middle = bounds_m(block).mean(axis=0)
+    x = round(block.position_m[0] + x_m - float(middle[0]), 6)
+    y = round(block.position_m[1] + y_m - float(middle[1]), 6)
+    lifted = replace(block, position_m=(x, y, block.position_m[2] + _LIFT_M))
+    fall = drop_height_m(lifted, onto)
+    return replace(lifted, position_m=(x, y, round(lifted.position_m[2] - fall, 6)))
+
+
+def lowered_round(put: Block, onto: Sequence[Block], radius_m: float) -> Iterator[Block]:
+    """Yield the block let down anew all round, so far off [m] in eight directions."""
+    x, y, _ = bounds_m(put).mean(axis=0).tolist()
+    for number in range(_DIRECTIONS):
+        angle = 2 * math.pi * number / _DIRECTIONS
+        yield lowered(put, onto, x + radius_m * math.cos(angle), y + radius_m * math.sin(angle))
+
+
+def surely_stays(blocks: Sequence[Block], order: int) -> bool | None:
+    """True if by statics one of the blocks and all that touches it stay; None where unsure."""
+    group = group_of(blocks, order)
+    if is_balanced(group):
+        return True if surely_stands(group) else None
+    return False if surely_falls(group) else None
+
+
+def stays_round(put: Block, onto: Sequence[Block], radius_m: float) -> bool | None:
+    """True if by statics a block let down stays, and likewise all round; None where unsure."""
+    stays = surely_stays((*onto, put), put.order)
+    is_alike = stays is not None and all(
+        is_balanced(group_of((*onto, moved), moved.order)) is stays
+        for moved in lowered_round(put, onto, radius_m)
+    )
+    return stays if is_alike else None
+
+
+def verdict(blocks: Sequence[Block], order: int) -> bool | None:
+    """True if all stay; None where statics leave a doubt or settings of a simulation disagree."""
+    stays = surely_stays(blocks, order)
+    return stays if stays is not None and holds(blocks, order) is stays else None
+
+
+def group_of(blocks: Sequence[Block], order: int) -> tuple[Block, ...]:
+    """Return the blocks in reach of one, itself among them."""
+    return next(group for group in groups(blocks) if any(b.order == order for b in group))
+
+
+def lots_of(blocks: Sequence[Block]) -> list[list[Block]]:
+    """Return the blocks in lots; of every block of a lot of several, one rests on it or is below
+    it. Blocks that only touch side by side are of different lots: one may fall without the other.
+    """
+    lots: list[set[int]] = []
+    for order, below in support_graph(blocks).items():
+        lot = ({order} | below) - {GROUND}
+        lot = lot.union(*(other for other in lots if other & lot))
+        lots = [other for other in lots if not other & lot] + [lot]
+    return [[block for block in blocks if block.order in lot] for lot in lots]
+
+
+def is_sure(left: Sequence[Block], moved: Collection[int]) -> bool:
+    """True if blocks just left to themselves surely do what a simulation says.
+
+    Those that stay stand without those that go, and each lot of those that go cannot be borne
+    by those that stay: with every weight 5 mm off to any side, other masses, and friction to spare.
+    """
+    still = [block for block in left if block.order not in moved]
+    falling = lots_of([block for block in left if block.order in moved])
+    return all(surely_stands(group) for group in groups(still)) and all(
+        surely_falls([*still, *lot]) for lot in falling
+    )
+
+
+def resting_on(blocks: Sequence[Block], order: int, *, only: bool = False) -> Lot:
+    """Return the orders of the blocks that rest on a block, directly or not, without its own.
+
+    With `only` they rest on nothing but it and others that do. The naive rule says that these, or
+    those, fall when it is taken away, and nothing else.
+    """
+    found: Lot = frozenset({order})
+    for _ in blocks:
+        found |= {
+            one
+            for one, under in _below(tuple(blocks)).items()
+            if under & found and (not only or under <= found)
+        }
+    return found - {order}
+
 
 # CF
 
 TAKEN = "X"
 """The letter of the block that is taken away."""
-Ints = NDArray[np.int64]
-Lot = frozenset[int]
-"""Orders of blocks that move."""
 OUTCOME_TEXTS: tuple[str, ...] = tuple(base.WORDS["outcomes_of_removal"])
 """Outcomes of a removal, by the number of other blocks that do not stay; all are offered."""
-_ALL_SEEN = 0.12
 _VIEWS_TRIED, _REMOVALS_TRIED = 3, 4
 _MOST_LOTS, _MOST_TOGETHER = 40, 3
 _COLORS = tuple(itertools.permutations(sight.PLAIN_COLORS))
@@ -103,27 +184,40 @@ class CounterfactualMaker(Maker):
                 options = (right, *shuffled(rng, others))
                 facts = {"removed": order, "moved": sorted(moved)}
                 yield Draft(scene, "cf-count", options, (shown,), facts=facts, about=order)
-                yield from _color(scene, shown, order, moved, rng)
+                if four := _by_colors(shown, order, moved, rng):
+                    colors, pictures = four
+                    slots = dict(zip(("color", "other", "taken"), colors, strict=True))
+                    one = Draft(scene, "cf-color", pictures, (shown,), slots, facts, about=order)
+                    yield one
 
     def rederive(self, question: Question) -> tuple[int, ...]:
         """Simulate the removal again."""
         slots, shown = base.slots_of(question), sight.picture_of(question, "scene")
         order = sight.marked_order(shown, TAKEN)
-        outcome = sure_removal(shown.blocks, order)
-        if outcome is None:
+        left = [block for block in group_of(shown.blocks, order) if block.order != order]
+        moved: Lot | None = None
+        if surely_stands(group_of(shown.blocks, order)):
+            outcome = after_removal(shown.blocks, order)
+            is_near = set(outcome.moved) <= set(sight.orders_of(left))
+            if outcome.is_clear and is_near and is_sure(left, outcome.moved):
+                moved = frozenset(outcome.moved)
+        if moved is None:
             raise UnfairError(f"it is not sure what follows without block {order}")
-        gone = [block for block in shown.blocks if block.order == order]
         if not any(order in block.depend for block in shown.blocks):
             raise UnfairError(f"block {order} supports no other")
-        sight.require_seen(shown, sight.NAMED, gone)
+        sight.require_seen(shown, sight.NAMED, [b for b in shown.blocks if b.order == order])
         if question.wording != "cf-color":
-            right = _outcome_text(len(outcome.moved))
+            right = _outcome_text(len(moved))
             return base.only_index([option == right for option in question.options])
         told = [
             sight.highlighted(one, shown.blocks, slots, taken=order)
             for one in sight.option_pictures(question)
         ]
-        return base.only_index([one == set(outcome.moved) for one in told])
+        return base.only_index([one == moved for one in told])
+
+
+def _outcome_text(count: int) -> str:
+    return OUTCOME_TEXTS[min(count, len(OUTCOME_TEXTS) - 1)]
 
 
 def falling(blocks: Sequence[Block], order: int) -> Lot | None:
@@ -134,12 +228,7 @@ def falling(blocks: Sequence[Block], order: int) -> Lot | None:
     left, below = [block for block in blocks if block.order != order], _below(tuple(blocks))
     near = [o for o in below if order in below[o]] or [o for o in below[order] if o in below]
     with_load = [(frozenset({o}) | resting_on(blocks, o)) - {order} for o in near]
-    lots = {
-        frozenset[int]().union(*some)
-        for count in range(len(with_load) + 1)
-        for some in itertools.combinations(with_load, count)
-    }
-    for lot in sorted(lots, key=sorted):
+    for lot in sorted(_joined(with_load, len(with_load)), key=sorted):
         still = [block for block in left if block.order not in lot]
         loose = lots_of([block for block in left if block.order in lot])
         is_so = is_balanced(still) and not any(is_balanced([*still, *one]) for one in loose)
@@ -148,8 +237,14 @@ def falling(blocks: Sequence[Block], order: int) -> Lot | None:
     return None
 
 
-def _outcome_text(count: int) -> str:
-    return OUTCOME_TEXTS[min(count, len(OUTCOME_TEXTS) - 1)]
+def _joined(lots: Sequence[Lot], most: int, enough: int | None = None) -> set[Lot]:
+    """Return the unions of up to so many lots, and of none; of fewer where these are enough."""
+    found = {frozenset[int]()}
+    for number in range(1, most + 1):
+        found |= {frozenset[int]().union(*some) for some in itertools.combinations(lots, number)}
+        if enough is not None and len(found) > enough:
+            break
+    return found
 
 
 def _pictured(
@@ -158,7 +253,7 @@ def _pictured(
     """Return the blocks from a view that shows them all, with the one that goes marked."""
     for _ in range(_VIEWS_TRIED):
         plain = QuestionPicture("scene", blocks, base.drawn_view(rng))
-        mark = block_mark(plain, seen(plain), order, TAKEN)
+        mark = drawn.block_mark(plain, seen(plain), order, TAKEN)
         if (
             mark
             and sight.are_seen(plain, [order], sight.NAMED)
@@ -168,43 +263,29 @@ def _pictured(
     return None
 
 
-def _color(
-    scene: Scene, shown: QuestionPicture, order: int, moved: Lot, rng: np.random.Generator
-) -> Iterator[Draft]:
-    """Ask which blocks move, by pictures that color them."""
+def _by_colors(
+    shown: QuestionPicture, order: int, moved: Lot, rng: np.random.Generator
+) -> tuple[Sequence[str], tuple[QuestionPicture, ...]] | None:
+    """Return colors, and four pictures that color what moves, or in three what could and does not:
+    some blocks, with all that rests on them.
+    """
     plain = replace(shown, marks=())
+    share, left = sight.shares(plain), [b for b in plain.blocks if b.order != order]
+    with_load = [frozenset({b.order}) | resting_on(left, b.order) for b in left]
+    found = _joined(with_load, _MOST_TOGETHER, _MOST_LOTS)
+    fair = [lot for lot in found if lot != moved and all(share[o] >= sight.COUNTED for o in lot)]
+    lots = [moved, *shuffled(rng, sorted(fair, key=sorted))[:_MOST_LOTS]]
     pixels = shown_pixels(plain, seen(plain))
-    lots = [moved, *_other_lots(plain, order, rng, moved)]
     unlike = np.array([[sum(pixels[o] for o in a ^ b) for b in lots] for a in lots], dtype=float)
     measures = np.array([_looks_of_lot(plain, order, lot) for lot in lots])
     four = base.four_alike(measures, unlike, sight.LEAST_PIXELS, rng)
     colors = pick(rng, _COLORS)
-
-    def colored(lot: Lot) -> QuestionPicture:
+    options = []
+    for lot in (lots[place] for place in four):
         color = {b.order: colors[b.order not in lot] for b in plain.blocks} | {order: colors[2]}
-        return replace(plain, blocks=tuple(replace(b, color=color[b.order]) for b in plain.blocks))
-
-    options = tuple(colored(lots[place]) for place in four)
-    if options and sight.are_told_apart(options):
-        slots: dict[str, str] = dict(zip(("color", "other", "taken"), colors, strict=True))
-        facts = {"removed": order, "moved": sorted(moved)}
-        yield Draft(scene, "cf-color", options, (shown,), slots, facts, about=order)
-
-
-def _other_lots(
-    plain: QuestionPicture, taken: int, rng: np.random.Generator, moved: Lot
-) -> list[Lot]:
-    """Return lots that could move together and do not: some blocks, with all that rests on them."""
-    share = sight.shares(plain)
-    left = [block for block in plain.blocks if block.order != taken]
-    single = [frozenset({b.order}) | resting_on(left, b.order) for b in left]
-    found = {frozenset[int]()}
-    for number in range(1, _MOST_TOGETHER + 1):
-        found |= {frozenset().union(*some) for some in itertools.combinations(single, number)}
-        if len(found) > _MOST_LOTS:
-            break
-    fair = [lot for lot in found if lot != moved and all(share[o] >= sight.COUNTED for o in lot)]
-    return shuffled(rng, sorted(fair, key=sorted))[:_MOST_LOTS]
+        blocks = tuple(replace(block, color=color[block.order]) for block in plain.blocks)
+        options.append(replace(plain, blocks=blocks))
+    return (colors, tuple(options)) if options and sight.are_told_apart(options) else None
 
 
 def _looks_of_lot(plain: QuestionPicture, taken: int, lot: Lot) -> tuple[float, ...]:
@@ -222,45 +303,155 @@ def _looks_of_lot(plain: QuestionPicture, taken: int, lot: Lot) -> tuple[float, 
     )
 
 
-def resting_on(blocks: Sequence[Block], order: int, *, only: bool = False) -> Lot:
-    """Return the orders of the blocks that rest on a block, directly or not, without its own.
+# PD: structures of the data set stand at every step, few of their blocks rest on more than they
+# need, and none is held by a weight. So planks with weights are laid on them.
 
-    With `only` they rest on nothing but it and others that do. The naive rule says that these, or
-    those, fall when it is taken away, and nothing else.
+SPARE_M = 0.0005
+"""Further than the margin of statics a lever decides, as positions are rounded [m]."""
+UNIT_M = 0.0125
+"""The step of places along a plank [m]."""
+THIN_M, WIDE_M, _PILLAR_OFF_M = 0.025, 0.05, 0.0125
+"""Thickness of pillars [m], and how far off the middle of a top thin ones stand."""
+_FLAT: Euler = (0.0, 0.0, 0.0)
+WEIGHTS: tuple[tuple[BlockType, Euler], ...] = (
+    *(("cube", _FLAT), ("cylinder", _FLAT), ("cuboid2", (0.0, 90.0, 0.0))),
+    *(("cuboid2", (0.0, 0.0, 90.0)), ("cuboid3", (0.0, 90.0, 0.0))),
+)
+_PLANKS: tuple[BlockType, ...] = ("cuboid3", "cuboid3", "cuboid2")
+_MOST_LEFT_OUT = 5
+_FLAT_M, _LEAST_TOP_M, _HIGHEST_M = 0.0005, 0.045, 0.2
+
+
+class Bench(NamedTuple):
+    """A structure nearly done, with loose blocks to lay along one line over a flat top of it.
+
+    The first loose block is a plank that lies on the top, the others are weights on the plank: a
+    balance, or a cantilever held by a weight. `reach_m` is half the length of the top along the
+    line; `lengths_m` are those of the loose blocks.
     """
-    found: Lot = frozenset({order})
-    for _ in blocks:
-        found |= {
-            one
-            for one, under in _below(tuple(blocks)).items()
-            if under & found and (not only or under <= found)
-        }
-    return found - {order}
+
+    base: tuple[Block, ...]
+    top: Block
+    along: int
+    loose: tuple[Block, ...]
+    reach_m: float
+    lengths_m: Floats
+    masses_kg: Floats
+
+    def laid(self, offs_m: Sequence[float]) -> tuple[Block, ...] | None:
+        """Return all blocks, the loose ones so far off the middle of the top [m]; None where they
+        overlap.
+        """
+        middle, blocks = bounds_m(self.top).mean(axis=0), self.base
+        for block, off_m in zip(self.loose, offs_m, strict=True):
+            x, y = (float(middle[i]) + (off_m if i == self.along else 0.0) for i in (0, 1))
+            onto = blocks[len(self.base) :][:1] or [self.top]
+            blocks = (*blocks, lowered(block, onto, x, y))
+        return None if find_overlaps(blocks) else blocks
+
+    @property
+    def limits_m(self) -> tuple[float, float]:
+        """So far off the middle [m] weights may lean and surely stay; from so far on they fall."""
+        return self.reach_m - MARGIN_M - SPARE_M, self.reach_m + MARGIN_M + SPARE_M
+
+    @property
+    def middle_m(self) -> float:
+        """Distance of the middle of the structure from that of the top, along the line [m]."""
+        ends = np.array([bounds_m(block)[:, self.along] for block in self.base])
+        top = bounds_m(self.top)[:, self.along]
+        return float((ends.min() + ends.max()) / 2 - top.mean())
+
+    def plans_m(self, count: int, rng: np.random.Generator) -> Floats:
+        """Return places for the loose blocks, off the middle of the top, (plans, blocks) [m].
+
+        These are drawn so often, and left out where two weights are in one place.
+        """
+        half = int(self.lengths_m[0] / UNIT_M / 2)
+        steps = rng.integers(1 - half, half, size=(count, len(self.loose)))
+        plans: Floats = steps.astype(np.float64) * UNIT_M
+        plans[:, 1:] += plans[:, :1]
+        if len(self.loose) > 2:
+            plans = plans[np.ptp(plans[:, 1:], axis=1) >= self.lengths_m[1:].mean() + SPARE_M]
+        return plans
+
+    def leans_m(self, plans_m: Floats) -> Floats:
+        """Return how far off the middle of the top the weight is, by the plan [m]."""
+        leans: Floats = plans_m @ self.masses_kg / self.masses_kg.sum()
+        return leans
 
 
-# The support graph is asked again for every block of a structure.
-_below = functools.lru_cache(maxsize=64)(support_graph)
+def free_tops(blocks: Sequence[Block]) -> list[Block]:
+    """Return the blocks with a flat top, square to the axes and not too high, on which nothing
+    rests.
+    """
+    carrying = {order for block in blocks for order in block.depend}
+    tops = []
+    for block in blocks:
+        corners = corners_m(block.type, block.position_m, block.euler_deg)
+        high_m = float(corners[:, 2].max())
+        flat = corners[corners[:, 2] > high_m - _FLAT_M, :2]
+        is_wide = bool(np.ptp(flat, axis=0).min() >= _LEAST_TOP_M)
+        if block.order not in carrying and is_square(block) and is_wide and high_m <= _HIGHEST_M:
+            tops.append(block)
+    return tops
 
 
-@functools.lru_cache(maxsize=16)
-def sure_removal(blocks: tuple[Block, ...], order: int) -> Outcome | None:
-    """Return the sure outcome of a removal; None where settings or statics leave a doubt."""
-    group = group_of(blocks, order)
-    if not surely_stands(group):
-        return None
-    outcome = after_removal(blocks, order)
-    near = [block for block in group if block.order != order]
-    is_near = set(outcome.moved) <= {block.order for block in near}
-    return outcome if outcome.is_clear and is_near and is_sure(near, outcome.moved) else None
+def is_square(block: Block) -> bool:
+    """True if the sides of a block are square to the axes."""
+    return all(abs(angle % 90.0) < 1e-6 for angle in block.euler_deg)
 
 
-# PD
+@functools.cache
+def pillars(along: int, thick_m: float) -> list[Turned]:
+    """Return blocks to lay a plank on, with their poses, so thick along an axis."""
+    return [
+        (block_type, euler)
+        for block_type in ("cuboid1", "cuboid2")
+        for euler in SHAPES[block_type].poses.values()
+        if abs(np.ptp(corners_m(block_type, (0.0, 0.0, 0.0), euler)[:, along]) - thick_m) < _FLAT_M
+    ]
+
+
+def bench(
+    base: tuple[Block, ...],
+    top: Block,
+    weights: int,
+    pillar_m: float,
+    first: int,
+    rng: np.random.Generator,
+) -> Bench:
+    """Return a bench on a top, with a plank and so many weights, whose orders begin with `first`.
+
+    Where a pillar is asked for, of a thickness above 0, the plank lies on that.
+    """
+    along = int(rng.integers(2))
+    if pillar_m:
+        block_type, turned = pick(rng, pillars(along, pillar_m))
+        pillar = Block(first, block_type, pick(rng, COLORS), (0.0, 0.0, 0.0), turned, (), 1)
+        at = bounds_m(top).mean(axis=0)[:2]
+        at[along] += int(rng.integers(-1, 2)) * _PILLAR_OFF_M * (pillar_m < WIDE_M)
+        top, first = lowered(pillar, base, *at.tolist()), first + 1
+        base = (*base, top)
+    low, high = bounds_m(top)
+    kinds = [(pick(rng, _PLANKS), _FLAT), *(pick(rng, WEIGHTS) for _ in range(weights))]
+    loose = tuple(
+        Block(first + i, block_type, pick(rng, COLORS), (0.0, 0.0, float(high[2])), turned, (), 1)
+        for i, (block_type, (roll, pitch, yaw)) in enumerate(kinds)
+        for turned in [(roll, pitch, (yaw + 90.0 * along) % 180.0)]
+    )
+    lengths = np.array([float(np.diff(bounds_m(block), axis=0)[0, along]) for block in loose])
+    masses = np.array([SHAPES[block.type].mass_kg for block in loose])
+    return Bench(base, top, along, loose, float(high[along] - low[along]) / 2, lengths, masses)
 
 
 _BENCHES_TRIED, _SHOWN, _ONE_STAYS = 80, 60, [True, False, False, False]
 _ELEVATIONS_DEG = (20, 38)
-_LEAN, _LEAST_ACROSS, _ON_A_PILLAR = 2.0, 0.5, 0.8
-_SIDES_XY = ((1, 0), (-1, 0), (0, 1), (0, -1))
+_LEAST_ACROSS, _ON_A_PILLAR = 0.5, 0.8
+_LEAN = 2.0 * math.tan(math.radians(LEAN_DEG))
+"""The right plank also stays on a floor that leans twice as far as those of simulations, where
+blocks are let go at once.
+"""
+_LEANS = ((_LEAN, 0.0), (-_LEAN, 0.0), (0.0, _LEAN), (0.0, -_LEAN))
 _PLANS, _FOURS = 400, 4000
 _OVER = (0, 1, 1, 2, 2, 2)
 """Ranks of the right plank that are asked for; the higher, the harder to find."""
@@ -281,51 +472,53 @@ class PredictiveMaker(Maker):
         for _ in range(self.drafts_a_scene):
             ranks = (pick(rng, _OVER), int(rng.integers(len(LETTERS))))
             tried = (_next_steps(scene, ranks, rng) for _ in range(_BENCHES_TRIED))
-            yield from itertools.islice(itertools.chain.from_iterable(tried), 1)
+            yield from itertools.islice(filter(None, tried), 1)
 
     def rederive(self, question: Question) -> tuple[int, ...]:
         """Decide by statics and simulation."""
         base.slots_of(question)
-        shown, options = sight.picture_of(question, "scene"), sight.option_pictures(question)
-        return base.only_index([_can_follow(shown, one) for one in options])
+        shown, stays = sight.picture_of(question, "scene"), []
+        placed = set(sight.orders_of(shown.blocks))
+        for option in sight.option_pictures(question):
+            added = [block for block in option.blocks if block.order not in placed]
+            kept = tuple(block for block in option.blocks if block.order in placed)
+            if not added or not sight.same_blocks(kept, shown.blocks):
+                raise UnfairError(f"picture {option.label} does not add to the structure")
+            stays.append(verdict(option.blocks, added[0].order))
+            if stays[-1] is None:
+                raise UnfairError(f"it is not sure whether all stays in picture {option.label}")
+        return base.only_index(stays)
 
 
-def _next_steps(scene: Scene, ranks: Ranks, rng: np.random.Generator) -> Iterator[Draft]:
-    """Yield a question about a bench drawn, as far as one has such plans for it."""
-    stages = stage(scene, rng)
+def _next_steps(scene: Scene, ranks: Ranks, rng: np.random.Generator) -> Draft | None:
+    """Return a question about a bench drawn on a scene nearly done, if it has such plans."""
+    order = scene.graph.random_order(rng)
+    kept = len(order) - int(rng.integers(min(_MOST_LEFT_OUT, max(len(order) - 2, 0)) + 1))
+    stages = tuple(scene.blocks[vertex] for vertex in sorted(order[:kept]))
     if not (tops := free_tops(stages)):
-        return
+        return None
     pillar_m = THIN_M if rng.random() < _ON_A_PILLAR else 0.0
     first = max(sight.orders_of(scene.blocks)) + 1
     on = bench(stages, pick(rng, tops), 2, pillar_m, first, rng)
     every = [blocks for offs_m in four_plans(on, ranks, rng) if (blocks := on.laid(offs_m))]
     if len(every) < len(LETTERS):
-        return
-    view, framed = base.drawn_view(rng, _ELEVATIONS_DEG), _framed(every)
+        return None
+    view = base.drawn_view(rng, _ELEVATIONS_DEG)
+    # All pictures are framed on the blocks of all of them.
+    poses = {(block.type, block.position_m, block.euler_deg): block for s in every for block in s}
+    framed = tuple(replace(block, order=i) for i, block in enumerate(poses.values(), 1))
     plain = QuestionPicture("scene", on.base, view, framed=framed)
     options = [replace(plain, blocks=blocks) for blocks in every]
     if (
-        is_across(on, view)
+        abs(view_axes(*view)[0][on.along]) >= _LEAST_ACROSS
         and sight.are_told_apart(options)
         and min(min(shown_pixels(one, seen(one)).values()) for one in options) >= _SHOWN
         and [surely_stays(p.blocks, p.blocks[-1].order) for p in options] == _ONE_STAYS
-        and stays_leaning(every[0], every[0][-1].order)
+        and all(is_balanced(group_of(every[0], every[0][-1].order), lean) for lean in _LEANS)
     ):
         facts, kind = {"placed": sight.orders_of(on.base)}, f"plank {ranks[0]}"
-        yield Draft(scene, "pd-next", tuple(options), (plain,), {}, facts, kind)
-
-
-def is_across(on: Bench, view: View) -> bool:
-    """True if the line of the plank runs across the view."""
-    return bool(abs(view_axes(*view)[0][on.along]) >= _LEAST_ACROSS)
-
-
-def stays_leaning(blocks: Sequence[Block], order: int) -> bool:
-    """True if by statics all near a block stay on a floor that leans twice as far as those of
-    simulations, where they are let go at once.
-    """
-    group, slope = group_of(blocks, order), _LEAN * math.tan(math.radians(LEAN_DEG))
-    return all(is_balanced(group, (x * slope, y * slope)) for x, y in _SIDES_XY)
+        return Draft(scene, "pd-next", tuple(options), (plain,), {}, facts, kind)
+    return None
 
 
 def four_plans(on: Bench, ranks: Ranks, rng: np.random.Generator) -> list[list[float]]:
@@ -362,25 +555,6 @@ def ranks_of(fours: Floats) -> Ints:
     steps = fours[:, 1:] - fours[:, :1]
     is_apart = (np.abs(steps) >= SPARE_M).all(axis=1)
     return np.where(is_apart, (steps < 0).sum(axis=1), -1)
-
-
-def _framed(every: Sequence[Sequence[Block]]) -> tuple[Block, ...]:
-    """Return the blocks of all pictures that are compared, to frame a camera on."""
-    poses = {(block.type, block.position_m, block.euler_deg): block for s in every for block in s}
-    return tuple(replace(block, order=i) for i, block in enumerate(poses.values(), 1))
-
-
-def _can_follow(shown: QuestionPicture, option: QuestionPicture) -> bool:
-    """True if blocks were added so that all stays; UnfairError when that is not sure."""
-    placed = {block.order for block in shown.blocks}
-    added = [block for block in option.blocks if block.order not in placed]
-    kept = tuple(block for block in option.blocks if block.order in placed)
-    if not added or not sight.same_blocks(kept, shown.blocks):
-        raise UnfairError(f"picture {option.label} does not add to the structure")
-    stays = verdict(option.blocks, added[0].order)
-    if stays is None:
-        raise UnfairError(f"it is not sure whether all stays in picture {option.label}")
-    return stays
 
 
 # AD
@@ -423,12 +597,15 @@ class AffordanceMaker(Maker):
         for _ in range(self.drafts_a_scene):
             rank = int(rng.integers(len(LETTERS)))
             tried = (_set_down(scene, rank, rng) for _ in range(_STRUCTURES_TRIED))
-            yield from itertools.islice(itertools.chain.from_iterable(tried), 1)
+            yield from itertools.islice(filter(None, tried), 1)
 
     def rederive(self, question: Question) -> tuple[int, ...]:
         """Decide by statics and simulation of the block at every place, and statics all round."""
         slots = base.slots_of(question)
-        shown, alone = sight.picture_of(question, "scene"), sight.picture_of(question, BLOCK_LABEL)
+        shown, alone = (
+            sight.picture_of(question, "scene"),
+            sight.picture_of(question, drawn.BLOCK_LABEL),
+        )
         if len(alone.blocks) != 1:
             raise UnfairError("the second picture is not of one block")
         block = alone.blocks[0]
@@ -438,7 +615,7 @@ class AffordanceMaker(Maker):
         plain, stays = replace(shown, marks=()), []
         for letter in LETTERS:
             places = [mark.position_m for mark in shown.marks if mark.letter == letter]
-            places = [at for at in places if seen_order(plain, seen(plain), at) is not None]
+            places = [at for at in places if drawn.seen_order(plain, seen(plain), at) is not None]
             if not places:
                 raise UnfairError(f"no place {letter} is marked on a block")
             stays.append(stays_at(plain, block, places[0]))
@@ -447,19 +624,29 @@ class AffordanceMaker(Maker):
         return base.only_index(stays)
 
 
-def _set_down(scene: Scene, rank: int, rng: np.random.Generator) -> Iterator[Draft]:
-    """Yield at most one question about places on part of a scene and on planks round it.
+def _set_down(scene: Scene, rank: int, rng: np.random.Generator) -> Draft | None:
+    """Return a question about places on part of a scene and on planks round it, if there is one.
 
     Of the three wrong places, `rank` are nearer to the middle of their block than the right one.
     """
     view = base.drawn_view(rng, _VIEWED_FROM_DEG)
     across = np.abs(view_axes(*view)[0])
     if across.max() < _PLAINLY_ACROSS:
-        return
-    blocks = _built_round(scene, int(across.argmax()), rng)
+        return None
+    # The first blocks of the scene, and planks set up round them. Those planks that hang over a
+    # pillar do so along the axis that runs across the view.
+    count, more = int(rng.integers(2, _MOST_OF_SCENE + 1)), int(rng.integers(*_ADDED))
+    blocks = tuple(scene.blocks[i] for i in sorted(scene.graph.random_order(rng)[:count]))
+    low, high = whole_bounds_m(blocks)[:, :2]
+    order = max(sight.orders_of(scene.blocks)) + 1
+    for side in shuffled(rng, _SIDES_OF_SCENE):
+        if len(blocks) < count + more:
+            at_m = (low + high) / 2 + ((high - low) / 2 + rng.uniform(*_AWAY_M, size=2)) * side
+            blocks = _with_plank(blocks, at_m, order, int(across.argmax()), rng)
+            order = max(order, max(sight.orders_of(blocks)) + 1)
     plain = QuestionPicture("scene", blocks, view)
     if not is_inside(plain) or not sight.are_seen(plain, sight.orders_of(blocks), _ALL_SEEN):
-        return
+        return None
     points, order = points_of(plain, rng), max(sight.orders_of(blocks)) + 1
     for pose in shuffled(rng, _SET_DOWN):
         block = replace(at_place(pose), order=order, color=pick(rng, COLORS))
@@ -467,31 +654,14 @@ def _set_down(scene: Scene, rank: int, rng: np.random.Generator) -> Iterator[Dra
         if not four:
             continue
         if not all(map(surely_stands, groups(blocks))):
-            return
+            return None
         marks = tuple(Mark("A", (x, y, z)) for x, y, z in points.at_m[four].tolist())
         puts = [lowered(block, blocks, *mark.position_m[:2]) for mark in marks]
         if [stays_round(put, blocks, _WIDE_RING_M) for put in puts] == _ONE_STAYS:
-            shown = (plain, QuestionPicture(BLOCK_LABEL, (block,), view))
+            shown = (plain, QuestionPicture(drawn.BLOCK_LABEL, (block,), view))
             facts = {"block": block.type, "euler": list(block.euler_deg)}
-            yield Draft(scene, "ad-place", marks, shown, {"size": _size(block)}, facts, kind)
-            return
-
-
-def _built_round(scene: Scene, across: int, rng: np.random.Generator) -> tuple[Block, ...]:
-    """Return the first blocks of a scene, with planks set up round them.
-
-    Those planks that hang over a pillar do so along the axis that runs `across` the view.
-    """
-    count, more = int(rng.integers(2, _MOST_OF_SCENE + 1)), int(rng.integers(*_ADDED))
-    blocks = tuple(scene.blocks[i] for i in sorted(scene.graph.random_order(rng)[:count]))
-    low, high = whole_bounds_m(blocks)[:, :2]
-    order = max(sight.orders_of(scene.blocks)) + 1
-    for side in shuffled(rng, _SIDES_OF_SCENE):
-        if len(blocks) < count + more:
-            away_m = (high - low) / 2 + rng.uniform(*_AWAY_M, size=2)
-            blocks = _with_plank(blocks, (low + high) / 2 + away_m * side, order, across, rng)
-            order = max(order, max(sight.orders_of(blocks)) + 1)
-    return blocks
+            return Draft(scene, "ad-place", marks, shown, {"size": _size(block)}, facts, kind)
+    return None
 
 
 def _with_plank(
@@ -627,7 +797,7 @@ def four_of(
     pairs = list(itertools.combinations(fours.T, 2))
     apart = np.array([np.linalg.norm(pixels[i] - pixels[j], axis=1) for i, j in pairs])
     is_other = np.array([points.on[i] != points.on[j] for i, j in pairs])
-    fours = fours[(apart.min(axis=0) >= MARKS_APART_PX) & is_other.all(axis=0)]
+    fours = fours[(apart.min(axis=0) >= drawn.MARKS_APART_PX) & is_other.all(axis=0)]
     ranks = np.array([ranks_of(one[fours]) for one in _measures_of(plain.blocks, points, rng)]).T
     is_fit = (ranks.min(axis=1) >= 0) & (ranks[:, 0] == rank)
     if not is_fit.any():

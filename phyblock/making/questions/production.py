@@ -23,9 +23,9 @@ import numpy as np
 from phyblock.domain.question import LETTERS, Mark, Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
 from phyblock.errors import DataError, PhyblockError, Problem
-from phyblock.making.questions.base import Draft, Floats, Maker, pick, shuffled
+from phyblock.making.questions.base import Draft, Maker, pick, shuffled
 from phyblock.making.questions.dynamics import AffordanceMaker, CounterfactualMaker, PredictiveMaker
-from phyblock.making.questions.measures import measures_of
+from phyblock.making.questions.guesses import keeping_odds, measures_of
 from phyblock.making.questions.properties import (
     ColorMaker,
     NumberMaker,
@@ -39,7 +39,6 @@ from phyblock.making.questions.relations import (
     PositionMaker,
     RotationMaker,
 )
-from phyblock.making.questions.text_probe import text_features
 from phyblock.making.questions.views import OrderingMaker, ViewpointMaker
 from phyblock.sim.question_pictures import filled
 from phyblock.types import BACKGROUNDS, Background
@@ -272,16 +271,11 @@ def _spread(pool: Sequence[Draft], count: int, rng: np.random.Generator) -> list
 def _even(draft: Draft) -> Iterator[tuple[Hashable, Hashable, float]]:
     """Yield groups, the draft's member of each, and weights: members should be as frequent."""
     yield "kind", draft.group, 6.0
-    if texts := _texts(draft):
+    if texts := draft.texts:
         yield ("options", draft.group), frozenset(texts), 0.2
     else:
         yield "scene", draft.scene.id, 3.0
         yield "level", draft.scene.level, 0.3
-
-
-def _texts(draft: Draft) -> tuple[str, ...]:
-    """Return the options as texts; of pictures and places, whose texts tell nothing, none."""
-    return tuple(option for option in draft.options if isinstance(option, str))
 
 
 def _identities(draft: Draft) -> list[Hashable]:
@@ -304,70 +298,3 @@ def even_letters(count: int, rng: np.random.Generator) -> list[int]:
         shares = np.bincount(drawn, minlength=len(LETTERS))
         if math.floor(low) <= shares.min() and shares.max() <= math.ceil(high):
             return [int(letter) for letter in drawn]
-
-
-_STEPS, _RATE, _PENALTY = 60, 0.3, 2.0
-_FITTED = 2000
-"""So many drafts are learned from at most, spread over the pool."""
-
-
-def keeping_odds(drafts: Sequence[Draft]) -> Floats:
-    """Return the probability with which each draft is kept; 1 where there is nothing to guess by.
-
-    A reader without pictures learns from half of the base scenes, and guesses at the other half: a
-    logistic regression of greatest penalized likelihood, by steps of AdaGrad (Duchi et al. 2011).
-    """
-    # SciPy takes a while to import, which commands that choose nothing do without.
-    from scipy import sparse  # type: ignore[import-untyped]
-
-    odds = np.ones(len(drafts))
-    telling = [i for i, one in enumerate(drafts) if _texts(one) or one.looks]
-    base_of = {i: (*drafts[i].scene.parents, drafts[i].scene.id)[0] for i in telling}
-    half_of = {base: n % 2 for n, base in enumerate(sorted(set(base_of.values())))}
-    halves = [[i for i in telling if half_of[base_of[i]] == half] for half in (0, 1)]
-
-    def table(chosen: Sequence[int], names: dict[str, int], grows: bool) -> sparse.csr_matrix:
-        """Return the features of all options, four rows a draft; new names are added or dropped."""
-        values, columns, starts = list[float](), list[int](), [0]
-        for features in (row for i in chosen for row in _features(drafts[i])):
-            known = {name: x for name, x in features.items() if grows or name in names}
-            values += known.values()
-            columns += (names.setdefault(name, len(names)) for name in known)
-            starts.append(len(values))
-        return sparse.csr_matrix((values, columns, starts), (len(starts) - 1, len(names)))
-
-    for mine, known in (halves, halves[::-1]) if all(halves) else ():
-        names: dict[str, int] = {}
-        learned = table(known[:: -(-len(known) // _FITTED)], names, True)
-        weights, squares = np.zeros(len(names)), np.full(len(names), 1e-9)
-        is_right = np.zeros((learned.shape[0] // len(LETTERS), len(LETTERS)))
-        is_right[:, 0] = 1.0
-        for _ in range(_STEPS):
-            missed = (is_right - _chances(learned @ weights)).ravel()
-            slope = learned.T @ missed - _PENALTY * weights
-            squares += slope**2
-            weights += _RATE * slope / np.sqrt(squares)
-        chances = _chances(table(mine, names, False) @ weights)
-        odds[mine] = chances.min(axis=1) / chances[:, 0]
-    return odds
-
-
-def _chances(scores: Floats) -> Floats:
-    """Return the probability of each of four options, shape (drafts, 4)."""
-    by_draft = scores.reshape(-1, len(LETTERS))
-    raised = np.exp(by_draft - by_draft.max(axis=1, keepdims=True))
-    chances: Floats = raised / raised.sum(axis=1, keepdims=True)
-    return chances
-
-
-def _features(one: Draft) -> Iterator[Mapping[str, float]]:
-    """Yield what a reader sees of each option, as it is and for its kind, beside the others."""
-    if one.looks:
-        for row in one.looks:
-            yield {f"{one.wording}: {i}": x for i, x in enumerate(row)}
-        return
-    options = _texts(one)
-    together = " / ".join(sorted(options))
-    for option, features in zip(options, text_features(one.text, options), strict=True):
-        own = {f"{one.group}: {name}": value for name, value in features.items()}
-        yield {"": 1.0, **features, **own, f"{one.group}: {option} of {together}": 1.0}

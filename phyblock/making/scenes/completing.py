@@ -81,6 +81,14 @@ class Completed:
     notes: tuple[str, ...]
 
 
+def completed(read: ReadScene) -> Completed | tuple[Problem, ...]:
+    """Return a scene as `complete` does, or what is wrong with it."""
+    try:
+        return complete(read)
+    except DataError as error:
+        return tuple(error.problems)
+
+
 def complete(read: ReadScene) -> Completed:
     """Derive a scene, and check that it can be built and stands.
 

@@ -1,0 +1,661 @@
+"""`phyblock scenes` and `phyblock questions`: make, check, show and draw data sets."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import shlex
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from functools import partial
+from itertools import chain
+from operator import call
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+from click.core import ParameterSource
+from PIL import Image
+
+from phyblock.cli.console import (
+    NAME_OR_PATH,
+    UserPath,
+    jobs_option,
+    left_to_first,
+    make_console,
+    open_shards,
+    print_rows,
+    shards_folder,
+    shown_path,
+    tracked,
+    worker_options,
+)
+from phyblock.data.base import QuestionSet
+from phyblock.data.lookup import find_data_set, find_questions, read_data_set
+from phyblock.data.questions import read_questions
+from phyblock.data.scenes import SCENES_FILE
+from phyblock.domain.question import LETTERS, SUBTASK_NAMES, SUBTASKS, Subtask
+from phyblock.domain.scene import AssemblyTask
+from phyblock.domain.symmetry import fingerprint
+from phyblock.errors import DataError, Problem
+from phyblock.files import OutFolder, bundled_sets, write_named
+from phyblock.making import checks, files, season
+from phyblock.making.questions.audit import Probe, audit_questions
+from phyblock.making.questions.production import MAKERS, make_questions, problem_of
+from phyblock.making.scenes.candidates import make_candidates
+from phyblock.making.scenes.completing import Completed, completed, palette_of, read_given
+from phyblock.making.scenes.production import Production, builtin_forms, shares
+from phyblock.making.scenes.sketch import PALETTES, Palette, colorless
+from phyblock.sim.camera import VIEWS
+from phyblock.sim.engine import described_engine, other_engine
+from phyblock.sim.film import assembly_gif
+from phyblock.sim.pictures import (
+    RENDER_VERSION,
+    PictureStyle,
+    candidates_png,
+    composite_png,
+    goal_png,
+    visible_shares,
+)
+from phyblock.sim.question_pictures import question_png
+from phyblock.text import counted, did_you_mean, hex_digest
+from phyblock.tracks.difficulty import MEASURES
+from phyblock.types import BACKGROUNDS
+from phyblock.workers import Shards, Workers, open_workers
+
+T = TypeVar("T")
+R = TypeVar("R")
+
+
+@click.group("scenes")
+def scenes() -> None:
+    """Make data sets of scenes, check them by physics, and show them."""
+
+
+@click.group("questions")
+def questions() -> None:
+    """Make, check and show multiple-choice questions about scenes."""
+
+
+# Options and steps that commands share
+
+
+class _Several(click.ParamType[tuple[str, ...]]):
+    """A comma-separated list of known words, each once, or `all`."""
+
+    name = "words"
+
+    def __init__(self, known: Sequence[str]) -> None:
+        self._known = known
+
+    def convert(
+        self, value: str, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[str, ...]:
+        """Return the words in the order given."""
+        words = tuple(self._known) if value == "all" else tuple(value.upper().split(","))
+        if not set(self._known).issuperset(words) or len(set(words)) < len(words):
+            self.fail(f"{value!r}: give all, or some of {','.join(self._known)}", param, ctx)
+        return words
+
+
+_out = click.option(
+    "--out", "-o", type=UserPath(), required=True, metavar="DIR", help="Folder to write."
+)
+_seed = click.option("--seed", type=click.IntRange(0), default=0, show_default=True, metavar="S")
+
+
+@contextmanager
+def _making(
+    out: Path,
+    names: Sequence[str],
+    work: str,
+    *,
+    jobs: int,
+    ray_address: str | None,
+    shard: tuple[int, int] | None,
+) -> Iterator[tuple[Workers, Shards | None]]:
+    """Open workers for a set with files of these names; `work` describes it.
+
+    Raises StoreError if `out` already has a set, unless it is that of shards that continue.
+    """
+    if shard is None or not shards_folder(out).exists():
+        files.check_out(out, names)
+    shards = open_shards(shard, out, f"{work}\n{described_engine()}\n{season.code_digest()}\n")
+    with open_workers(jobs, ray_address, shards) as workers:
+        yield workers, shards
+
+
+def _mapped(function: Callable[[T], R], items: Sequence[T], jobs: int, doing: str) -> list[R]:
+    """Return the results of a function for the items, from `jobs` processes, with progress."""
+    with open_workers(min(jobs, len(items) or 1)) as workers:
+        return list(tracked(workers.map(function, items), len(items), doing))
+
+
+def _print_engine() -> None:
+    """Warn on standard error if the default engine may make another set from the same seed."""
+    if other := other_engine():
+        click.echo(
+            f"made with {other}: the default one may make another set of the same seed", err=True
+        )
+
+
+def _conclude(name: str, problems: Iterable[Problem | str]) -> None:
+    """Print the problems and the verdict on a set; exit with 1 if there are problems."""
+    failures = list(problems)
+    for failure in failures:
+        click.echo(f"failed: {failure}", err=True)
+    verdict = counted(len(failures), "failure") if failures else "all checks passed"
+    click.echo(f"{name}: {verdict}")
+    if failures:
+        raise click.exceptions.Exit(1)
+
+
+# Scenes
+
+
+@scenes.command("generate")
+@click.option("--count", type=click.IntRange(1), default=400, show_default=True, metavar="N")
+@click.option(
+    "--levels", type=_Several(("1", "2", "3", "4", "5+")), default="1,2,3,4", show_default=True
+)
+@click.option(
+    "--palette",
+    type=click.Choice(["kit", "full"]),
+    default="kit",
+    show_default=True,
+    help=f"The kit's {len(PALETTES['kit'])} pairs of type and color, or all pairs.",
+)
+@click.option(
+    "--exclude",
+    multiple=True,
+    type=NAME_OR_PATH,
+    metavar="SET",
+    help="Also exclude the scenes of this set, in any colors.",
+)
+@_seed
+@worker_options()
+@_out
+def generate_scenes(
+    count: int,
+    levels: tuple[str, ...],
+    palette: Palette,
+    exclude: tuple[str, ...],
+    seed: int,
+    out: Path,
+    **workers_options: Any,
+) -> None:
+    """Make N scenes with candidate sets, each checked by physics, and their data card.
+
+    None equals a scene of the built-in set, or of an excluded SET, even when recolored, turned,
+    mirrored or shifted. The same N, seed, levels and palette give the same files with the same
+    physics engine, on any Python, any number of processes or a cluster.
+    """
+    settled = _settled(count, levels, palette, exclude)
+    command = f"phyblock scenes generate {settled} --seed {seed} --out {out.name}"
+    others = (task.scene for name in exclude for task in read_data_set(name).tasks)
+    excluded = builtin_forms().union(colorless(scene.blocks) for scene in others)
+    work = f"{command}\n{hex_digest(b''.join(sorted(excluded)))}"
+    with _making(out, files.SCENE_FILES, work, **workers_options) as (workers, shards):
+        production = Production(seed, palette, workers, excluded)
+        produced = production.scenes(shares(count, [int(level[0]) for level in levels]))
+        tasks = [
+            (scene, make_candidates(scene, palette=PALETTES[palette]))
+            for scene in tracked(produced, count, "Making")
+        ]
+    if left_to_first(shards, out):
+        return
+    card = files.scene_card(out.name, tasks, command, palette, production.rejected)
+    files.write_scenes(out, tasks, card)
+    click.echo(f"{counted(count, 'scene')}, all checks passed: {shown_path(out)}")
+    known = "the built-in set or an excluded one" if exclude else "the built-in set"
+    click.echo(f"{counted(production.rejected, 'draft')} rejected: a scene of {known}")
+    _print_engine()
+
+
+def _settled(count: int, levels: Sequence[str], palette: str, exclude: Sequence[str]) -> str:
+    """Return arguments of generate in canonical form."""
+    text = f"--count {count} --levels {','.join(sorted(levels))} --palette {palette}"
+    return text + "".join(f" --exclude {shlex.quote(name)}" for name in exclude)
+
+
+@scenes.command("commit")
+@click.argument("arguments", nargs=-1, metavar="-- [ARGUMENT]...")
+@click.option(
+    "--public", required=True, metavar="TEXT", help="The later public value to use, in words."
+)
+@_out
+def commit(arguments: tuple[str, ...], public: str, out: Path) -> None:
+    """Commit to a set, by ARGUMENTS of generate, whose seed nobody can choose or know yet.
+
+    Writes DIR/secret.txt, to be kept, and DIR/commitment.json, to be published: digests of the
+    secret, of phyblock's code and of the built-in scenes, and the later public value to use.
+    """
+    secret, commitment = season.commit(out, _season_arguments(arguments), public)
+    click.echo(f"publish {shown_path(commitment)}; keep {shown_path(secret)}")
+
+
+@scenes.command("reveal")
+@click.argument("commitment", type=UserPath())
+@click.argument("secret", type=UserPath())
+@click.option("--public", required=True, metavar="VALUE", help="The public value that came later.")
+def reveal(commitment: Path, secret: Path, public: str) -> None:
+    """Print the command that makes the set of a COMMITMENT, once its SECRET is revealed.
+
+    Refuses another secret, code or physics engine than was committed to.
+    """
+    arguments, seed = season.reveal(commitment, secret, public)
+    settled = _season_arguments(shlex.split(arguments))
+    click.echo(f"phyblock scenes generate {settled} --seed {seed} --out DIR")
+
+
+def _season_arguments(words: Sequence[str]) -> str:
+    """Return arguments of generate in canonical form. Raises UsageError if they name a seed, a
+    folder, or a set that its maker could still change.
+    """
+    context = generate_scenes.make_context("generate", ["--out", ".", *words])
+    given = context.params
+    if context.get_parameter_source("seed") is not ParameterSource.DEFAULT:
+        raise click.UsageError("A season has no --seed: its secret and the public value give one.")
+    if given["out"] != Path("."):
+        raise click.UsageError("A season has no --out of generate: reveal prints the command.")
+    bundled = bundled_sets(SCENES_FILE)
+    if others := [name for name in given["exclude"] if name not in bundled]:
+        message = f"{others[0]} can change before the season: exclude a bundled set"
+        raise click.UsageError(f"{message} ({', '.join(bundled)}).")
+    return _settled(given["count"], given["levels"], given["palette"], given["exclude"])
+
+
+@scenes.command("compare")
+@click.argument("first", metavar="A", type=NAME_OR_PATH)
+@click.argument("second", metavar="B", type=NAME_OR_PATH)
+def compare(first: str, second: str) -> None:
+    """List the scenes of the data set A that B also holds, in any colors.
+
+    Scenes are equal if turning, mirroring and shifting makes one the other, and nearly equal if
+    then only colors differ.
+    """
+    tasks, known = read_data_set(first).tasks, read_data_set(second).tasks[::-1]
+    rows = []
+    # The first twin of each form in B counts.
+    equal = {fingerprint(task.scene.blocks): task.key for task in known}
+    nearly = {colorless(task.scene.blocks): task.key for task in known}
+    for task in tasks:
+        if twin := equal.get(fingerprint(task.scene.blocks)):
+            rows.append((task.key, twin, "equal"))
+        elif twin := nearly.get(colorless(task.scene.blocks)):
+            rows.append((task.key, twin, "equal but for colors"))
+    if rows:
+        print_rows(make_console(), ("scene of A", "scene of B", ""), rows, numbers=0)
+    same = sum(how == "equal" for *_, how in rows)
+    click.echo(
+        f"of {counted(len(tasks), 'scene')}: {same} equal, {len(rows) - same} equal but for colors"
+    )
+
+
+@scenes.command("complete")
+@click.argument("data", metavar="FILE_OR_FOLDER", type=UserPath())
+@jobs_option()
+@click.option("--out", "-o", type=UserPath(), help="Folder to write.  [default: NAME-set here]")
+def complete_set(data: Path, jobs: int, out: Path | None) -> None:
+    """Make a data set from scenes that give type, color, position and euler of their blocks.
+
+    FILE_OR_FOLDER is YAML, JSON, or JSON with one scene per line, or a folder of such files.
+    Derives dependencies from contacts, and layers and levels from those; draws candidates unless
+    they are given. Refuses scenes whose blocks overlap, float or fall. Never overwrites its input.
+    """
+    given = read_given(data)
+    folder = out or Path(f"{data.resolve().stem}-set")
+    files.check_out(folder, files.SCENE_FILES)
+    done = _mapped(completed, given, jobs, "Completing")
+    if problems := [problem for one in done if isinstance(one, tuple) for problem in one]:
+        raise DataError(problems)
+    whole = [one for one in done if isinstance(one, Completed)]
+    made = [one.scene for one in whole]
+    palette = PALETTES[palette_of(made)]
+    tasks = [
+        (one.scene, one.offered or make_candidates(one.scene, palette=palette)) for one in whole
+    ]
+    command = f"phyblock scenes complete {shlex.quote(data.name)} --out {shlex.quote(folder.name)}"
+    files.write_scenes(folder, tasks, files.completed_card(folder.name, len(tasks), command))
+    for one in whole:
+        for note in one.notes:
+            click.echo(f"note: scene {one.scene.id}: {note}")
+    for finding in checks.check_set(made):
+        click.echo(f"note: scene {finding.scene}: {finding.field} {finding.message}")
+    click.echo(f"{counted(len(tasks), 'scene')} completed: {shown_path(folder)}")
+    here = str(folder) if folder.is_absolute() else f"./{folder}"
+    click.echo(f"Next: phyblock run quick --set dataset.path={shlex.quote(here)}")
+
+
+@scenes.command("verify")
+@click.argument("data", metavar="[PATH]", default="phyblock-400", type=NAME_OR_PATH)
+@jobs_option()
+def verify_scenes(data: str, jobs: int) -> None:
+    """Check every number of every scene of PATH by geometry and physics.
+
+    PATH is a folder with scenes.jsonl, an official checkout or a bundled set, by default the
+    built-in phyblock-400. Nothing in it is changed.
+
+    Checks contacts, layers, overlaps, gaps, stability of the whole at two time steps and of every
+    step, candidates and duplicates. Overlaps and gaps of an official checkout may be 2 mm; all
+    other sets are also checked for sizes, hidden blocks, parents and checksums. Exits with 1 when
+    anything fails.
+    """
+    where = find_data_set(data)
+    is_official = not (where / SCENES_FILE).is_file()
+    tasks = [(task.scene, task.candidates) for task in read_data_set(data).tasks]
+    names, work = (*checks.VERIFIED, "duplicate", "parents"), checks.verify_scene
+    if is_official:
+        names, work = (*checks.FOREIGN_CHECKS, "duplicate"), checks.verify_foreign
+    found = [one for one in checks.check_set([scene for scene, _ in tasks]) if one.check in names]
+    found += chain.from_iterable(_mapped(work, tasks, jobs, "Verifying"))
+    failed = Counter(check for _, check in {(one.scene, one.check) for one in found})
+    rows = [(check, str(len(tasks) - failed[check]), str(len(tasks))) for check in names]
+    summed, changed = (0, ()) if is_official else files.check_sums(where)
+    if summed:
+        rows.append(("checksums", str(summed - len(changed)), str(summed)))
+    rows.append(("all", str(len(tasks) - len({one.scene for one in found})), str(len(tasks))))
+    print_rows(make_console(), ("check", "passed", "of"), rows, numbers=2)
+    _conclude(data, (*(finding.problem for finding in found), *changed))
+
+
+@scenes.command("show")
+@click.argument("data", metavar="PATH", type=NAME_OR_PATH)
+@click.argument("scene")
+def show_scene(data: str, scene: str) -> None:
+    """Show the facts of SCENE in the data set PATH: blocks, layers, dependencies, candidates.
+
+    "on" names the blocks below, "pick" the candidate for the block, "seen" the share of it that is
+    visible in the default goal picture.
+    """
+    task = read_data_set(data).task(scene)
+    shown, offered = task.scene, task.candidates
+    console = make_console()
+    levels, parents = " and ".join(map(str, shown.levels)), ", ".join(shown.parents)
+    size = f"{counted(len(shown), 'block')} · {counted(max(shown.graph.layers), 'layer')}"
+    heading = f"scene {shown.id} · level {levels} · {size} · made from {parents}"
+    console.print(heading, soft_wrap=True)
+    numbers = (f"{name} {measure(task):.3g}" for name, measure in MEASURES.items())
+    console.print(f"difficulty: {' · '.join(numbers)}", soft_wrap=True)
+    seen = visible_shares(shown, PictureStyle())
+    blocks = [
+        (
+            *(str(block.order), block.type, block.color),
+            " ".join(map(str, sorted(block.depend))) or "ground",
+            " ".join(f"{round(1000 * c, 1) + 0.0:g}" for c in block.position_m),
+            " ".join(f"{angle:g}" for angle in block.euler_deg),
+            *(str(block.layer), str(offered.index_of(block.look)), f"{seen[block.order]:.0%}"),
+        )
+        for block in shown.blocks
+    ]
+    columns = ["block", "type", "color", "on", "position mm", "euler deg", "layer", "pick", "seen"]
+    print_rows(console, columns, blocks, numbers=3)
+    looks = Counter(block.look for block in shown.blocks)
+    candidates = [
+        (
+            *(str(number), one.type, one.color),
+            " ".join(f"{angle:g}" for angle in one.euler_deg),
+            str(looks[one.look] or ""),
+        )
+        for number, one in enumerate(offered.candidates, 1)
+    ]
+    columns = ["candidate", "type", "color", "euler deg", "needed"]
+    print_rows(console, columns, candidates, numbers=1)
+
+
+@scenes.command("render")
+@click.argument("data", metavar="PATH", type=NAME_OR_PATH)
+@click.argument("names", metavar="[SCENE]...", nargs=-1)
+@click.option("--out", "-o", type=UserPath(file_okay=False), required=True, metavar="DIR")
+@click.option("--view", type=click.Choice([*VIEWS, "all"]), default="oblique", show_default=True)
+@click.option(
+    "--background",
+    type=click.Choice([*BACKGROUNDS, "all"]),
+    default="checkerboard",
+    show_default=True,
+)
+@click.option("--composite", is_flag=True, help="Goal and candidates side by side, too.")
+@click.option("--gif", is_flag=True, help="The assembly as an animated GIF, too.")
+@worker_options()
+def render(
+    data: str,
+    names: tuple[str, ...],
+    out: Path,
+    view: str,
+    background: str,
+    composite: bool,
+    gif: bool,
+    jobs: int,
+    ray_address: str | None,
+    shard: tuple[int, int] | None,
+) -> None:
+    """Draw the scenes SCENE... of the data set PATH, or all of them, at 512 by 512 pixels.
+
+    Files are named SCENE-VIEW-BACKGROUND; earlier ones of this command are overwritten.
+    """
+    read = read_data_set(data)
+    views = [name for name in VIEWS if view in (name, "all")]
+    floors = [name for name in BACKGROUNDS if background in (name, "all")]
+    drawings: dict[str, Callable[[], bytes]] = {}
+    for task in map(read.task, names) if names else read.tasks:
+        for seen in views:
+            for floor in floors:
+                style = PictureStyle(512, floor, *VIEWS[seen])
+                stem = f"{task.scene.id}-{seen}-{floor}"
+                drawings[f"{stem}.png"] = partial(goal_png, task.scene, style)
+                if composite:
+                    drawings[f"{stem}-composite.png"] = partial(_composite, task, style)
+                if gif:
+                    drawings[f"{stem}.gif"] = partial(assembly_gif, task.scene, style)
+    OutFolder(out).check(drawings)
+    work = f"scenes render: {read.sha256} {hex_digest(repr([RENDER_VERSION, *drawings]))}\n"
+    shards = open_shards(shard, out, work)
+    with open_workers(jobs, ray_address, shards) as workers:
+        _draw(out, drawings, workers, shards)
+    if not left_to_first(shards, out):
+        click.echo(f"{counted(len(drawings), 'file')} in {shown_path(out)}")
+
+
+def _composite(task: AssemblyTask, style: PictureStyle) -> bytes:
+    return composite_png(goal_png(task.scene, style), candidates_png(task.candidates, style))
+
+
+def _draw(
+    out: Path, drawings: dict[str, Callable[[], bytes]], workers: Workers, shards: Shards | None
+) -> None:
+    """Draw pictures by their names, and write them where this shard is the one that writes."""
+    drawn = tracked(workers.map(call, drawings.values()), len(drawings), "Drawing")
+    for name, picture in zip(drawings, drawn, strict=True):
+        if shards is None or shards.writes:
+            OutFolder(out).write({name: picture})
+
+
+# Questions
+
+
+_about = click.argument("path", metavar="[PATH]", default="phyblock-vqa", type=NAME_OR_PATH)
+_data = click.option(
+    "--data",
+    default="phyblock-400",
+    type=NAME_OR_PATH,
+    show_default=True,
+    metavar="PATH",
+    help="The scenes that the questions are about: a folder or a bundled set.",
+)
+
+
+def _read(path: str, data: str) -> QuestionSet:
+    return read_questions(find_questions(path), read_data_set(data))
+
+
+@questions.command("generate")
+@_data
+@click.option("--subtasks", type=_Several(SUBTASKS), default="all", show_default=True)
+@click.option(
+    "--per-subtask",
+    type=click.IntRange(1),
+    metavar="N",
+    help="Questions of each subtask; by default 150, of PD 100.",
+)
+@click.option("--pictures", is_flag=True, help="Draw all pictures into DIR/pictures, too.")
+@_seed
+@worker_options()
+@_out
+def generate_questions(
+    data: str,
+    subtasks: tuple[Subtask, ...],
+    per_subtask: int | None,
+    pictures: bool,
+    seed: int,
+    out: Path,
+    **workers_options: Any,
+) -> None:
+    """Make questions with derived answers, and their data card.
+
+    The same scenes, subtasks, numbers and seed give the same files with the same physics engine,
+    on any Python, any number of processes or a cluster.
+    """
+    command = f"phyblock questions generate --data {data} --seed {seed} --out {out.name}"
+    if len(subtasks) < len(SUBTASKS):
+        command += f" --subtasks {','.join(subtasks)}"
+    if per_subtask is not None:
+        command += f" --per-subtask {per_subtask}"
+    if pictures:
+        command += " --pictures"
+    wanted = {subtask: per_subtask or MAKERS[subtask].count for subtask in subtasks}
+    read = read_data_set(data)
+    work = f"{command}\n{read.sha256}"
+    with _making(out, files.QUESTION_FILES, work, **workers_options) as (workers, shards):
+        originals = {task.scene.id: task.scene for task in read.tasks}
+        made = make_questions(list(originals.values()), wanted, seed, workers, tracked)
+        drawings: dict[str, Callable[[], bytes]] = {
+            f"{files.PICTURES}/{question.id}-{one.label}.png": partial(
+                question_png, one, PictureStyle()
+            )
+            for question in (made if pictures else ())
+            for one in question.pictures
+        }
+        _draw(out, drawings, workers, shards)
+    if left_to_first(shards, out):
+        return
+    card = files.question_card(out.name, read.name, made, command, has_pictures=pictures)
+    files.write_questions(out, made, originals, card, list(drawings))
+    outcome = f"{counted(len(made), 'question')} in {counted(len(subtasks), 'subtask')}"
+    each_s = sum(os.times()[:4]) / len(made)
+    click.echo(f"{outcome}, {each_s:.1f} CPU seconds each: {shown_path(out)}")
+    _print_engine()
+
+
+@questions.command("verify")
+@_about
+@_data
+@jobs_option()
+def verify_questions(path: str, data: str, jobs: int) -> None:
+    """Derive every answer of PATH again, from scene, pictures and simulator.
+
+    PATH is a folder with questions.jsonl or a bundled set, by default the built-in phyblock-vqa.
+    Exits with 1 when an answer differs, a question is not fair, or a file has changed.
+    """
+    read = _read(path, data)
+    # Questions about one scene are processed together, so that pictures are shared.
+    asked = sorted((task.question for task in read.tasks), key=lambda question: question.scene.id)
+    problems = _mapped(problem_of, asked, jobs, "Verifying")
+    counts = Counter(question.subtask for question in asked)
+    failed = Counter(q.subtask for q, p in zip(asked, problems, strict=True) if p)
+    summed, changed = files.check_sums(read.root)
+    rows: list[tuple[str, ...]] = [
+        (s, SUBTASK_NAMES[s], str(counts[s] - failed[s]), str(counts[s]))
+        for s in SUBTASKS
+        if counts[s]
+    ]
+    rows.append(("", "checksums", str(summed - len(changed)), str(summed)))
+    print_rows(make_console(), ("subtask", "", "derived again", "of"), rows, numbers=2)
+    failures = [f"{q.id}: {p}" for q, p in zip(asked, problems, strict=True) if p]
+    _conclude(path, (*sorted(failures), *changed))
+
+
+@questions.command("show")
+@click.argument("question")
+@click.option("--questions", "path", default="phyblock-vqa", type=NAME_OR_PATH, show_default=True)
+@_data
+@click.option("--out", type=UserPath(), metavar="FILE", help="Draw the pictures to this PNG.")
+def show_question(question: str, path: str, data: str, out: Path | None) -> None:
+    """Show QUESTION, an id like sh-001: text, options, answer and evidence.
+
+    With --out, draw its pictures side by side, in the order of the recipe.
+    """
+    read = _read(path, data)
+    by_id = {task.question.id: task.question for task in read.tasks}
+    if question not in by_id:
+        hint = did_you_mean(question, by_id)
+        raise DataError(Problem(str(read.root), "holds no such question", "", question, hint=hint))
+    shown = by_id[question]
+    console = make_console()
+    for line in (
+        f"{shown.id} · {SUBTASK_NAMES[shown.subtask]} · scene {shown.scene.id}",
+        f"pictures: {', '.join(picture.label for picture in shown.pictures)}",
+        "",
+        shown.text,
+        *(f"  {letter}. {text}" for letter, text in zip(LETTERS, shown.options, strict=True)),
+        "",
+        f"answer: {shown.answer_letters}",
+        f"evidence: {json.dumps(shown.evidence)}",
+    ):
+        console.print(line, soft_wrap=True)
+    if out is not None:
+        style, gap_px = PictureStyle(), 8
+        images = [Image.open(io.BytesIO(question_png(one, style))) for one in shown.pictures]
+        step = style.size_px + gap_px
+        sheet = Image.new("RGB", (len(images) * step - gap_px, style.size_px), "white")
+        for i, image in enumerate(images):
+            sheet.paste(image, (i * step, 0))
+        file = io.BytesIO()
+        sheet.save(file, "PNG")
+        write_named(out, file.getvalue())
+        console.print(f"pictures: {shown_path(out)}", soft_wrap=True)
+
+
+@questions.command("audit")
+@_about
+@_data
+def audit(path: str, data: str) -> None:
+    """Audit the questions of PATH: could they be answered without understanding?
+
+    PATH is a folder with questions.jsonl or a bundled set, by default the built-in phyblock-vqa.
+    Shows by subtask how often each letter is right and the accuracy of three probes on questions
+    about base scenes that they did not learn from: the most frequent answer, the texts alone, and
+    simple features of the pictures that are options. Exits with 0, whatever it finds.
+    """
+    asked = [task.question for task in _read(path, data).tasks]
+    subtasks = len({question.subtask for question in asked})
+    audits = list(tracked(audit_questions(asked), subtasks, "Auditing"))
+
+    def shown(probe: Probe | None) -> str:
+        if probe is None:
+            return "-"
+        low, high = probe.interval
+        return f"{100 * probe.accuracy:.0f} [{100 * low:.0f}, {100 * high:.0f}]"
+
+    rows = [
+        (
+            *(one.subtask, SUBTASK_NAMES[one.subtask], str(one.n)),
+            *(f"{100 * share:.0f}" for share in (*one.letters, one.chance)),
+            *(shown(one.probes.get(name)) for name in ("majority", "text", "pictures")),
+        )
+        for one in audits
+    ]
+    console = make_console()
+    headings = ("", "subtask", "n", *LETTERS, "chance", "majority", "texts", "pictures")
+    print_rows(console, headings, rows, numbers=9)
+    console.print(
+        "Percent. A to D: how often the letter is right (ordering: comes first). Probes: accuracy "
+        "with a 95 % interval."
+    )
+    for name, probe in ((n, p) for one in audits for n, p in one.probes.items() if "," in n):
+        console.print(f"{name}: {shown(probe)} of {probe.n}")
+    findings = [finding for one in audits for finding in one.findings()]
+    for finding in findings:
+        console.print(finding, soft_wrap=True)
+    console.print(f"{counted(len(asked), 'question')}, {counted(len(findings), 'finding')}")

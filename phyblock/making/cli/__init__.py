@@ -1,1 +1,0 @@
-"""The commands `phyblock scenes ...` and `phyblock questions ...`, one module each."""

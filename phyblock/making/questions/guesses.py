@@ -1,0 +1,242 @@
+"""By what someone might guess the answer of a question without understanding it.
+
+Of texts, words and numbers; of pictures, simple measures. Drafts are dropped until these tell
+nothing (`keeping_odds`), and the audit learns from them.
+"""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from phyblock.domain.question import LETTERS, Question
+from phyblock.making.questions.base import Draft, Floats
+from phyblock.sim.pictures import Shot
+from phyblock.sim.question_pictures import SEEN_PX, changed_pixels, mark_pixel, seen
+from phyblock.text import plain_sum
+
+Mask = NDArray[np.bool_]
+_BELOW_PX, _BANDS, _CROSSED = 3, 6, 0.25
+_WORD = re.compile(r"[a-z]+|\d+(?:\.\d+)?")
+_NUMBER = re.compile(r"\d+(?:\.\d+)?")
+
+
+def measures_of(question: Question) -> Floats:
+    """Measures of each option beside the others, shape (options, measures); empty without any.
+
+    Deviations from the mean of the options in standard deviations, and the absolute values of
+    these less their mean.
+    """
+    pictures = {picture.label: picture for picture in question.pictures}
+    scene = pictures.get("scene")
+    shots = [seen(pictures[letter]) for letter in LETTERS if letter in pictures]
+    if not shots and not (scene and scene.marks):
+        return np.empty((0, 0))
+    start = seen(replace(scene, marks=())) if scene else None
+    marks = (
+        {mark.letter: mark_pixel(scene, mark.position_m) for mark in scene.marks} if scene else {}
+    )
+    if shots:
+        values = np.array(list(_of_pictures(shots, start, marks.get("X"))))
+    elif start and marks.keys() >= set(LETTERS):
+        values = np.array([_of_place(start, marks[letter]) for letter in LETTERS])
+    elif start and "X" in marks:
+        # The same texts are offered each time: what a place says is learned for each text.
+        about = np.array([1.0, *_of_place(start, marks["X"])])
+        offered = sorted(question.options)
+        each = [np.eye(len(offered))[offered.index(option)] for option in question.options]
+        crossed = np.array([np.outer(one, about).ravel() for one in each])
+        return np.asarray(crossed - crossed.mean(axis=0))
+    else:
+        return np.empty((0, 0))
+    spread = values.std(axis=0)
+    steps = (values - values.mean(axis=0)) / np.where(spread > 1e-9, spread, 1.0)
+    return np.hstack([steps, np.abs(steps) - np.abs(steps).mean(axis=0)])
+
+
+def _of_pictures(
+    shots: Sequence[Shot], start: Shot | None, mark: tuple[int, int] | None
+) -> Iterator[list[float]]:
+    """Yield measures of each picture that is an option."""
+    for i, shot in enumerate(shots):
+        others = [changed_pixels(shot, other) for k, other in enumerate(shots) if k != i]
+        mask, alone = shot.block >= 0, np.sum(others, axis=0) >= len(others) - 1
+        color = shot.rgb[mask].mean(axis=0) if mask.any() else np.zeros(3)
+        row = [*_extent(mask), *color, float(np.sum(others)), *_extent(alone)]
+        if start is not None:
+            changed = changed_pixels(start, shot)
+            row += [*_extent(changed), _share_held(start, changed)]
+            row += np.abs(_colors_by_height(shot) - _colors_by_height(start)).sum(axis=1).tolist()
+            row.append(float(np.abs(_colors_by_height(shot) - _colors_by_height(start)).sum()))
+            if mark is not None:
+                rows, columns = np.nonzero(changed)
+                row.append(float(np.hypot(rows - mark[0], columns - mark[1]).min(initial=SEEN_PX)))
+                row += [float(np.mean(columns) - mark[1]), float(np.mean(rows) - mark[0])]
+        yield row
+
+
+def _share_held(start: Shot, changed: Mask) -> float:
+    """Return the share of a change's lower edge with something of the start right below it."""
+    edge = changed[:-_BELOW_PX] & ~changed[_BELOW_PX:]
+    held = edge & (start.block[_BELOW_PX:] >= 0)
+    return float(held.sum() / max(int(edge.sum()), 1))
+
+
+def _colors_by_height(shot: Shot) -> Floats:
+    """Return the mean color of the blocks in each of six bands from top to bottom, shape (6, 3)."""
+    rows = np.nonzero(shot.block >= 0)[0]
+    ends = np.linspace(rows.min(initial=SEEN_PX), rows.max(initial=0) + 1, _BANDS + 1).astype(int)
+    bands = np.zeros((_BANDS, 3))
+    for band, low, high in zip(bands, ends[:-1], ends[1:], strict=True):
+        mask = shot.block[low:high] >= 0
+        if mask.any():
+            band += shot.rgb[low:high][mask].mean(axis=0) / 255
+    return bands
+
+
+def _of_place(start: Shot, at: tuple[int, int]) -> list[float]:
+    """Return where a mark is in the structure, and how much shows of its block and around it."""
+    rows, columns = np.nonzero(start.block >= 0)
+    mine = start.block == start.block[at]
+    room = np.hypot(*(np.argwhere(~mine) - at).T).min(initial=SEEN_PX) / SEEN_PX
+    block_rows, block_columns = np.nonzero(mine)
+    area = max(len(rows), 1)
+    return [
+        float((at[0] - rows.mean()) / max(np.ptp(rows), 1)),
+        float((at[1] - columns.mean()) / max(np.ptp(columns), 1)),
+        float((rows < at[0]).sum() / area),
+        float(mine.sum() / area),
+        float(room),
+        float(len(np.unique(start.block)) / 20),
+        float((at[1] - block_columns.mean()) / SEEN_PX),
+        float((at[0] - block_rows.mean()) / SEEN_PX),
+    ]
+
+
+def _extent(mask: Mask) -> list[float]:
+    """Area, mean row and column, and extents of a mask [pixels]; zeros where it is empty."""
+    rows, columns = np.nonzero(mask)
+    if not len(rows):
+        return [0.0] * 5
+    return [len(rows), *(float(f(line)) for f in (np.mean, np.ptp) for line in (rows, columns))]
+
+
+def text_features(text: str, options: Sequence[str]) -> list[Mapping[str, float]]:
+    """Return features of each option beside one another and the text that asks, by name; 0 where a
+    name is missing.
+
+    These are the shortcuts that multiple-choice questions are known for: words that are right
+    often, the largest or the middle number, the option that shares most with the others, the
+    longest one. Letters are not among them: how often each is right is counted, not learned.
+    """
+    words = [_WORD.findall(option.lower()) for option in options]
+    asked = set(_WORD.findall(text.lower()))
+    found = [_NUMBER.findall(option) for option in options]
+    numbers = [float(one[0]) if len(one) == 1 else None for one in found]
+    lengths = [len(option) for option in options]
+    shared = [
+        plain_sum(_overlap(one, other) for k, other in enumerate(words) if k != j)
+        for j, one in enumerate(words)
+    ]
+    rows: list[Mapping[str, float]] = []
+    for i, mine in enumerate(words):
+        pairs = [" ".join(pair) for pair in itertools.pairwise(mine)]
+        whole = " ".join(mine)
+        rows.append(
+            {
+                **{f"option {word}": 1.0 for word in [*mine, *pairs, whole]},
+                **{f"asked {one} option {whole}": _CROSSED for one in asked},
+                "likeness": shared[i],
+                "most alike": float(shared[i] == max(shared) > min(shared)),
+                "least alike": float(shared[i] == min(shared) < max(shared)),
+                **_rank("number", numbers, i),
+                **_rank("length", lengths, i),
+                "asked about": float(len(asked.intersection(mine))),
+            }
+        )
+    return rows
+
+
+def _rank(name: str, values: Sequence[float | None], i: int) -> dict[str, float]:
+    known = [value for value in values if value is not None]
+    mine = values[i]
+    if mine is None or len(known) < len(values) or len(set(known)) < 2:
+        return {}
+    return {f"{name} rank {sum(value < mine for value in known)}": 1.0}
+
+
+def _overlap(one: Sequence[str], other: Sequence[str]) -> float:
+    union = set(one) | set(other)
+    return len(set(one) & set(other)) / len(union) if union else 0.0
+
+
+_STEPS, _RATE, _PENALTY = 60, 0.3, 2.0
+_FITTED = 2000
+"""So many drafts are learned from at most, spread over the pool."""
+
+
+def keeping_odds(drafts: Sequence[Draft]) -> Floats:
+    """Return the probability with which each draft is kept; 1 where there is nothing to guess by.
+
+    A reader without pictures learns from half of the base scenes, and guesses at the other half: a
+    logistic regression of greatest penalized likelihood, by steps of AdaGrad (Duchi et al. 2011).
+    """
+    # SciPy takes a while to import, which commands that choose nothing do without.
+    from scipy import sparse  # type: ignore[import-untyped]
+
+    odds = np.ones(len(drafts))
+    telling = [i for i, one in enumerate(drafts) if one.texts or one.looks]
+    base_of = {i: (*drafts[i].scene.parents, drafts[i].scene.id)[0] for i in telling}
+    half_of = {base: n % 2 for n, base in enumerate(sorted(set(base_of.values())))}
+    halves = [[i for i in telling if half_of[base_of[i]] == half] for half in (0, 1)]
+
+    def table(chosen: Sequence[int], names: dict[str, int], grows: bool) -> sparse.csr_matrix:
+        """Return the features of all options, four rows a draft; new names are added or dropped."""
+        values, columns, starts = list[float](), list[int](), [0]
+        for features in (row for i in chosen for row in _features(drafts[i])):
+            known = {name: x for name, x in features.items() if grows or name in names}
+            values += known.values()
+            columns += (names.setdefault(name, len(names)) for name in known)
+            starts.append(len(values))
+        return sparse.csr_matrix((values, columns, starts), (len(starts) - 1, len(names)))
+
+    for mine, known in (halves, halves[::-1]) if all(halves) else ():
+        names: dict[str, int] = {}
+        learned = table(known[:: -(-len(known) // _FITTED)], names, True)
+        weights, squares = np.zeros(len(names)), np.full(len(names), 1e-9)
+        is_right = np.zeros((learned.shape[0] // len(LETTERS), len(LETTERS)))
+        is_right[:, 0] = 1.0
+        for _ in range(_STEPS):
+            missed = (is_right - _chances(learned @ weights)).ravel()
+            slope = learned.T @ missed - _PENALTY * weights
+            squares += slope**2
+            weights += _RATE * slope / np.sqrt(squares)
+        chances = _chances(table(mine, names, False) @ weights)
+        odds[mine] = chances.min(axis=1) / chances[:, 0]
+    return odds
+
+
+def _chances(scores: Floats) -> Floats:
+    """Return the probability of each of four options, shape (drafts, 4)."""
+    by_draft = scores.reshape(-1, len(LETTERS))
+    raised = np.exp(by_draft - by_draft.max(axis=1, keepdims=True))
+    chances: Floats = raised / raised.sum(axis=1, keepdims=True)
+    return chances
+
+
+def _features(one: Draft) -> Iterator[Mapping[str, float]]:
+    """Yield what a reader sees of each option, as it is and for its kind, beside the others."""
+    if one.looks:
+        for row in one.looks:
+            yield {f"{one.wording}: {i}": x for i, x in enumerate(row)}
+        return
+    options = one.texts
+    together = " / ".join(sorted(options))
+    for option, features in zip(options, text_features(one.text, options), strict=True):
+        own = {f"{one.group}: {name}": value for name, value in features.items()}
+        yield {"": 1.0, **features, **own, f"{one.group}: {option} of {together}": 1.0}
