@@ -4,14 +4,14 @@ import gc
 import os
 import signal
 import sys
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Generator
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
 
 from phyblock.data.base import Dataset, QuestionSet
-from tests.fork_server import ONE_THREAD, end_fork_server
+from tests.fork_server import ONE_THREAD
 from tests.workspace import KEY, KEY_VARIABLE, Raw, Workspace, write_questions
 
 OFFICIAL_MISSING = (
@@ -74,12 +74,6 @@ def official_dir() -> Path:
 def official_checkout(official_dir: Path) -> Path:
     """The (partial) checkout of the official repository."""
     return official_dir / "PhyBlock"
-
-
-@pytest.fixture(scope="session", autouse=True)
-def _no_process_is_left() -> Iterator[None]:
-    yield
-    end_fork_server()
 
 
 @pytest.fixture(scope="session")

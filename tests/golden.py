@@ -20,7 +20,6 @@ from pathlib import Path
 from typing import Any
 
 from tests.conftest import official_root
-from tests.fork_server import end_fork_server
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Workspace, csv_rows
@@ -160,7 +159,6 @@ def main() -> int:
             differences += found
             print(f"{name}: {f'{len(found)} differences' if found else 'equal'}", flush=True)
     finally:
-        end_fork_server()
         if options.keep is None:
             shutil.rmtree(root)
     print(*differences, sep="\n")

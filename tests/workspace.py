@@ -22,7 +22,7 @@ import yaml
 from click.testing import CliRunner, Result
 
 from phyblock.domain.question import CATEGORIES, LETTERS, SUBTASKS
-from tests.fork_server import ONE_THREAD, Done, Forked, fork_server
+from tests.fork_server import ONE_THREAD, Done, Forked, run_forked
 
 Raw = dict[str, Any]
 S = TypeVar("S")
@@ -214,7 +214,7 @@ class Workspace:
         """
         words, settings = [*map(str, args)], {**self.env, **(env or {})}
         if not fresh:
-            return fork_server().run(words, self.root, settings, bytes_left)
+            return run_forked(words, self.root, settings, bytes_left)
         done = subprocess.run(
             [*COMMAND, *words],
             cwd=self.root,
@@ -270,7 +270,7 @@ class Workspace:
     def start(self, *args: str | Path) -> Forked:
         """Start `run` and return at once; the process leads a group of its own."""
         words = ["run", "suite.yaml", "--out", self.out, "--no-report", *args]
-        return fork_server().start([*map(str, words)], self.root, self.env)
+        return Forked([*map(str, words)], self.root, self.env)
 
     def records(self, folder: Path | None = None) -> list[Raw]:
         """The lines of a run's records, as they stand; the file is made with the first one."""

@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 
 from aiohttp import web
 
-from tests.fork_server import fork_server
+from tests.fork_server import run_forked
 from tests.servers.chassis import Seen
 from tests.servers.faults import WIRE_FAULTS
 from tests.servers.openai_chat import OpenAIChat, StepAgent
@@ -71,7 +71,7 @@ def run_watched(
     with tempfile.TemporaryFile() as file:
         code, out, err = None, "", ""
         with contextlib.suppress(subprocess.TimeoutExpired):
-            done = fork_server().run(args, folder, env, timeout_s=longest_s, deeds=file)
+            done = run_forked(args, folder, env, timeout_s=longest_s, deeds=file)
             code, out, err = done.code, done.out, done.err
         file.seek(0)
         return Ended(code, out, err, tuple(tuple(json.loads(line)) for line in file))

@@ -11,7 +11,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from tests.fork_server import fork_server
+from tests.fork_server import Forked
 from tests.web.conftest import LOOK, Visit
 from tests.workspace import SCENES, plan_text, questions, read_lines, write_questions
 
@@ -49,7 +49,7 @@ def workspace(new_workspace):
 def sitting(browser, workspace, **options):
     """A page at the address that a browser is started with; it asks for nothing elsewhere."""
     command = [*ADA, "--out", "ada", "--beside", "out"]
-    with fork_server().start(command, workspace.root, workspace.env) as process:
+    with Forked(command, workspace.root, workspace.env) as process:
         try:
             line = process.stdout.readline()
             printed = re.search(r"(http://127\.0\.0\.1:\d+/)(\S+)/", line)
