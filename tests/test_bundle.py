@@ -197,10 +197,10 @@ def test_what_does_not_follow_from_the_replies_is_refused(made, tmp_path, name):
 
 def test_what_is_not_changed_is_made_here_to_the_byte(made, tmp_path):
     """Forgeries are refused for what was changed, not for how they are made."""
-    was = contents(made, tmp_path / "was")
     path = forged(made, tmp_path / "forged", lambda *_: None)
     with opened_bundle(path, folders(made)) as found:
-        assert (found.folder / RECORDS).read_bytes() == was[RECORDS]
+        held = contents(made, tmp_path / "was")
+        assert (found.folder / RECORDS).read_bytes() == held[RECORDS]
 
 
 def test_data_are_never_looked_for_where_a_bundle_says(made, tmp_path):
@@ -217,15 +217,11 @@ SOUND = with_digests(
 LESS = [(name, data) for name, data in SOUND.items() if name != RECORDS]
 
 
-def packed():
-    file = io.BytesIO()
-    with zipfile.ZipFile(file, "w") as made:
-        for name in MEMBERS:
-            add(made, name, [SOUND[name].decode()])
-    return file.getvalue()
-
-
-PACKED = packed()
+_FILE = io.BytesIO()
+with zipfile.ZipFile(_FILE, "w") as _made:
+    for _name in MEMBERS:
+        add(_made, _name, [SOUND[_name].decode()])
+PACKED = _FILE.getvalue()
 
 
 def linked():
@@ -251,8 +247,7 @@ HOSTILE = {
     "empty": lambda: b"",
     "text": lambda: b"hello\n" * 100,
     "out of the folder": lambda: archive(*SOUND.items(), ("../../evil", b"x")),
-    "absolute": lambda: archive(*SOUND.items(), ("/tmp/evil", b"x")),
-    "other name": lambda: archive(*LESS, ("evil.py", b"x")),
+    "absolute": lambda: archive(*LESS, ("/tmp/evil", b"x")),
     "folder": lambda: archive(*LESS, (f"{RECORDS}/", b"")),
     "twice": lambda: archive(*SOUND.items(), (RECORDS, b"x")),
     "link": linked,
@@ -260,7 +255,6 @@ HOSTILE = {
     "larger than it says": smaller_than_it_is,
     "encrypted": encrypted,
     "lacks one": lambda: archive(*LESS),
-    "thousands": lambda: archive(*((f"{n}", b"") for n in range(70))),
     "changed": lambda: archive(*LESS, (RECORDS, b"other")),
     "no digests": lambda: archive(*LESS[:1], (RECORDS, b"other"), (ABOUT, b"[]")),
     "other format": lambda: archive(*with_digests(SOUND, {"format": 2}).items()),

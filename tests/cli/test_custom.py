@@ -28,24 +28,16 @@ def test_a_prompt_beside_the_suite_is_used(asked):
     assert texts == {"Which of the 16?"}
 
 
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("{% block user %}{{ wrong }}{% endblock %}", "'wrong' is undefined"),
-        ("{% block user %}a{% endblock %}{% block sytem %}b{% endblock %}", "mean system?"),
-        ("{# mine #}\nBe short.\n{% block user %}a{% endblock %}", "is outside of the blocks"),
-        # Of another track, which has turns.
-        ("{% block user %}a{% endblock %}{% block turn %}b{% endblock %}", "that nothing uses"),
-    ],
-)
 @pytest.mark.parametrize("verb", ["validate", "run"])
-def test_a_prompt_is_rendered_before_anything_is_asked(asked, text, said, verb):
+def test_a_prompt_is_rendered_before_anything_is_asked(asked, verb):
     asked.write_models("http://127.0.0.1:9", "alpha")
+    # Of another track, which has turns.
+    text = "{% block user %}a{% endblock %}{% block turn %}b{% endblock %}"
     own_prompt(asked).write_text(text, encoding="utf-8")
     done = asked.phyblock(verb, "suite.yaml")
     assert done.code == 2
     assert "full_planning.j2" in done.err
-    assert said in done.err
+    assert "that nothing uses" in done.err
     assert not (asked.root / "results").exists()
 
 

@@ -255,25 +255,20 @@ def test_a_verb_writes_over_its_own_files_and_no_others(tmp_path, verb):
     assert set(files(tmp_path / "theirs")) <= {name, LIST}
 
 
-def refused(workspace, output, *words):
-    done = subprocess.run(
-        [*COMMAND, *words],
-        cwd=workspace.root,
-        env=workspace.env | {"PYTHONIOENCODING": "ascii"},
-        stdout=output,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    return done.returncode, done.stderr
-
-
 def test_output_that_nobody_takes_is_no_traceback(suite):
+    def models(output):
+        env = suite.env | {"PYTHONIOENCODING": "ascii"}
+        done = subprocess.run(
+            [*COMMAND, "models"], env=env, stdout=output, stderr=subprocess.PIPE, text=True
+        )
+        return done.returncode, done.stderr
+
     with open("/dev/full", "wb") as full:
-        code, said = refused(suite, full.fileno(), "models")
+        code, said = models(full)
     assert (code, said) == (2, "error: output: cannot be used: No space left on device\n")
     reader, writer = os.pipe()
     os.close(reader)
-    assert refused(suite, writer, "models") == (1, "")
+    assert models(writer) == (1, "")
     os.close(writer)
 
 
