@@ -1,10 +1,8 @@
 """Measures and tracks that are added in one place; names and counts that clash are refused."""
 
-import json
 import math
 import re
 import shutil
-from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 from typing import ClassVar
@@ -17,37 +15,13 @@ from phyblock.errors import SpecError
 from phyblock.results.compare import comparable, compare
 from phyblock.results.estimates import Headline
 from phyblock.results.load import load_run, track_measures
-from phyblock.results.tables import write_tables
 from phyblock.run.rescore import rescore
 from phyblock.scoring.plan import mean_of, ratio_of
 from phyblock.tracks.base import Judgement, SceneTrack
 from phyblock.tracks.full_planning import FullPlanning
 from phyblock.tracks.measures import LayoutColumn, Measure, SampleCounts, TrackReport
 from phyblock.web.board import SiteRun, Sources, board_of, entries_of, values_of
-from tests.workspace import call, csv_rows, write_lines, write_questions
-
-
-def needless_steps(task, record):
-    """Steps that name a block more often than the goal has it, and all steps."""
-    plan = record.parse.plan
-    needed = Counter(block.look for block in task.scene.blocks)
-    named = Counter(task.candidates[step].look for step in plan)
-    return (named - needed).total(), len(plan)
-
-
-NEEDLESS = Measure(
-    "needless",
-    "Needless steps",
-    SampleCounts("needless_steps", ("needless", "n"), sample=needless_steps),
-    ratio_of,
-    "steps that name a block more often than the goal has it",
-    better="lower",
-    over="steps",
-)
-
-
-LATER = ("blocks", "kept")
-"""What scores of earlier versions lack."""
+from tests.workspace import call, write_lines, write_questions
 
 
 @pytest.fixture
@@ -63,52 +37,15 @@ def here(inside):
     return inside
 
 
-def test_scoring_again_fills_in_what_older_records_lack(here, add):
-    assert not call("run", "suite.yaml", "--out", here.out, "--no-report")
-    stored = here.records()
-    assert not any("needless_steps" in record["counts"] for record in stored)
-    bare = [
-        [{k: v for k, v in one.items() if k not in LATER} for one in line["scores"]]
-        for line in stored
-    ]
-    lines = ({**line, "scores": scores} for line, scores in zip(stored, bare, strict=True))
-    write_lines(here.out / "records.jsonl", lines)
-    add("full_planning", NEEDLESS)
-    write_tables(here.out)
-    known = {row["measure"] for row in here.rows("estimates")}
-    assert known.isdisjoint({"needless", "distance", "blocks_order"})
-    assert {"success", "macro_f1"} <= known
-    scored = Path(shutil.copytree(here.out, here.root / "scored"))
-    call("score", scored)
-    write_tables(scored)
-    estimates = csv_rows(scored / "tables" / "estimates.csv")
-    rows = [row for row in estimates if row["measure"] == "needless"]
-    assert {row["cell"] for row in rows} == {"1", "2", "3", "4", "overall"}
-    whole = {row["model"]: row for row in rows if row["cell"] == "overall"}
-    assert float(whole["oracle"]["value"]) == float(whole["oracle"]["lo"]) == 0
-    row = whole["all-candidates"]
-    assert 0.5 < float(row["lo"]) <= float(row["value"]) <= float(row["hi"]) < 1
-    call("compare", scored, "--measure", "needless", "--out", scored / "compared")
-    parts = csv_rows(scored / "compared" / "comparison.csv")
-    (compared,) = (row for row in parts if row["part"] == "overall")
-    assert float(compared["value_b"]) == pytest.approx(100 * float(row["value"]), abs=1e-3)
-    assert float(compared["lo"]) < float(compared["difference"]) < float(compared["hi"])
-    assert (compared["better"], compared["worse"]) == ("5", "0")
-    for line, again in zip(stored, here.records(scored), strict=True):
-        assert json.dumps({**line, "counts": again["counts"]}, sort_keys=True) == json.dumps(
-            again, sort_keys=True
-        )
-
-
 SAMPLED = SampleCounts("sampled", ("part", "whole"), sample=lambda _, __: (1, 2))
 HALF = Measure("half", "Half", SAMPLED, ratio_of, "one of two")
 
 
 @pytest.mark.parametrize(
-    "more", [{}, {"name": "steps"}, {"name": "table1"}, {"name": "mine", "tables": ("errors",)}]
+    "more", [{}, {"name": "steps"}, {"name": "mine"}, {"name": "mine", "section": "vqa"}]
 )
 def test_a_name_that_is_taken_is_refused(more):
-    kind = type("Taken", (FullPlanning,), {"tables": (), **more})
+    kind = type("Taken", (FullPlanning,), more)
     with pytest.raises(ValueError, match="has this name"):
         registry.register_track(kind)
     assert kind not in registry.known_tracks().values()

@@ -70,6 +70,7 @@ def test_orders_stay_as_they_were_drawn(tasks):
     orders = {0: (5, 9, 7, 4, 2, 11), 1: (14, 12, 15, 11, 13, 10)}
     for seed, order in orders.items():
         assert presented(tasks[0], seed, "shuffled").order[:6] == order
+    assert all(presented(task, 5, "file") is task for task in tasks)
     for order in ([1, 1, 2], [0, 1], [17]):
         with pytest.raises(DataError, match="not an order of its candidates"):
             in_order(tasks[0], order)
@@ -118,11 +119,6 @@ def test_an_episode_goes_the_same_in_either_numbering(tasks, place, seed, moves)
     for name in ("scores", "outcomes", "ending"):
         assert here[name] == there[name]
     assert in_file(shown, here["parse"]["plan"]) == there["parse"]["plan"]
-
-
-def test_a_plain_presentation_changes_nothing(tasks):
-    assert all(presented(task, 5, "file") is task for task in tasks)
-    assert track_of("full_planning", tasks, seeds=[0, 1]).about(tasks[0]) == {}
 
 
 @st.composite

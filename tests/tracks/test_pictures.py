@@ -9,12 +9,11 @@ from PIL import Image as PillowImage
 
 from phyblock.config.suite import ImagesSpec
 from phyblock.domain.scene import AssemblyTask
-from phyblock.errors import DataError, StoreError
+from phyblock.errors import DataError
 from phyblock.sim.pictures import candidates_png
 from phyblock.tracks.base import presented
 from phyblock.tracks.pictures import Workshop, picture_style, scene_drawings
 from tests.fuzz.strategies import png_header
-from tests.shipped import official_tasks
 
 COMPOSITE = ImagesSpec(size_px=128)
 GOAL_FIRST = ImagesSpec(size_px=128, layout="separate")
@@ -72,30 +71,21 @@ def test_an_outline_draws_nothing_and_has_the_real_sizes(tasks, tmp_path):
         assert shop.rendered == 0
 
 
-def test_keys_follow_content_and_style_alone(tasks):
-    larger = ImagesSpec(size_px=256)
-    every = (COMPOSITE, larger, GOAL_FIRST, GOAL_LAST)
-    assert len({tuple(keys(images, task)) for images in every for task in tasks[:2]}) == 8
-    assert set(keys(GOAL_FIRST, tasks[0])) == set(keys(GOAL_LAST, tasks[0]))
-
-
 @pytest.mark.parametrize("layout", ["separate", "composite"])
-def test_pictures_follow_what_is_shown(tasks, layout, shop):
+def test_pictures_and_their_keys_follow_what_is_shown(tasks, layout, shop):
     images = ImagesSpec(size_px=128, layout=layout)
-    style = picture_style(images)
-
-    def sent(task):
-        return asyncio.run(shop.images(scene_drawings(task, images)))
-
-    plain = sent(tasks[0])
-    blind = presented(tasks[0], 1, "shuffled", is_blind=True)
-    (grid,) = sent(blind)
-    assert grid.data == candidates_png(blind.candidates, style)
-    assert shop.outlines(scene_drawings(blind, images)) == (grid,)
-    assert [image.label for image in plain] == (
-        ["composite"] if layout == "composite" else ["goal", "candidates"]
+    plain, blind = tasks[0], presented(tasks[0], 1, "shuffled", is_blind=True)
+    both, (grid,) = (
+        asyncio.run(shop.images(scene_drawings(task, images))) for task in (plain, blind)
     )
-    assert keys(images, tasks[0]) != keys(images, blind)
+    assert grid.data == candidates_png(blind.candidates, picture_style(images))
+    assert shop.outlines(scene_drawings(blind, images)) == (grid,)
+    labels = ["composite"] if layout == "composite" else ["goal", "candidates"]
+    assert [image.label for image in both] == labels
+    every = (COMPOSITE, ImagesSpec(size_px=256), GOAL_FIRST, GOAL_LAST)
+    shown = (*tasks[:2], blind)
+    assert len({tuple(keys(one, task)) for one in every for task in shown}) == 8 + 2
+    assert set(keys(GOAL_FIRST, plain)) == set(keys(GOAL_LAST, plain))
 
 
 @pytest.fixture
@@ -122,24 +112,14 @@ def test_the_data_sets_picture_is_sent_byte_for_byte_or_parted_in_two_halves(
     colors = {"goal": (255, 0, 0), "candidates": (0, 0, 255)}
     for picture in pair:
         assert opened(picture).getcolors() == [(255 * 256, colors[picture.label])]
+    blind = presented(composite_task, 0, "file", is_blind=True)
+    ((grid,),), _ = draw(tmp_path / "cache", OWN, [blind])
+    assert grid in pair
     before = keys(OWN, composite_task)
     PillowImage.new("RGB", (514, 256), "green").save(composite_task.composite)
     assert keys(OWN, composite_task) != before
     with pytest.raises(DataError, match="has no picture of it"):
         draw(tmp_path, OWN, [replace(composite_task, composite=None)])
-
-
-def test_pictures_of_the_data_set_can_leave_out_the_goal(official_checkout):
-    pool = [one for one in official_tasks(official_checkout) if one.composite is not None]
-    task = pool[0]
-    blind = presented(task, 0, "file", is_blind=True)
-    separate = ImagesSpec(source="dataset", layout="separate")
-
-    def sent(images, task):
-        return asyncio.run(Workshop(1).images(scene_drawings(task, images)))
-
-    _, grid = sent(separate, task)
-    assert sent(separate, blind) == sent(OWN, blind) == (grid,)
 
 
 @pytest.mark.parametrize("size", [(30_000, 30_000), (1, 1), (0, 9)])
@@ -149,11 +129,3 @@ def test_what_is_no_picture_in_the_cache_is_drawn_anew(tasks, tmp_path, size):
     (tmp_path / key[:2] / f"{key}.png").write_bytes(png_header(*size))
     (outline,) = Workshop(1, tmp_path).outlines(scene_drawings(tasks[0], COMPOSITE))
     assert outline.data == b""
-
-
-def test_a_cache_that_cannot_be_written_is_said_so(tasks, tmp_path):
-    taken = tmp_path / "taken"
-    taken.write_text("mine", encoding="utf-8")
-    with pytest.raises(StoreError, match="PHYBLOCK_CACHE"):
-        draw(taken, COMPOSITE, tasks[:1])
-    assert taken.read_text(encoding="utf-8") == "mine"

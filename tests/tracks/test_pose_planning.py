@@ -3,7 +3,6 @@
 import asyncio
 import functools
 import shutil
-from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -21,11 +20,10 @@ from phyblock.scoring.plan import Goal
 from phyblock.scoring.pose import POSE_ERRORS, PoseFit, pose_errors
 from phyblock.sim.dynamics import execute
 from phyblock.sim.engine import Pose
-from phyblock.sim.geometry import center_cm, origin_m, put
+from phyblock.sim.geometry import center_cm, put
 from phyblock.tracks import pose_planning as pose_track
-from phyblock.tracks.full_planning import PlanSubject
 from phyblock.tracks.pose_planning import POSE_RULES, written
-from phyblock.types import REFUSED_ENDS, STEP_ENDS
+from phyblock.types import STEP_ENDS
 from tests.shipped import TASKS
 from tests.sim.structures import block_types, eulers
 from tests.tracks.conftest import track_of
@@ -114,35 +112,18 @@ def test_a_reply_is_read_scored_and_carried_out(task, text, right, ends, errors,
     assert judged(track, task, {**fields, **track.about(task)}, again) == record
 
 
-def worlds_of(put, steps):
-    """Return the blocks after each step, as the report shows them."""
-    lying = {}
-    worlds = []
-    for number, (block, step) in enumerate(zip(put, steps, strict=True), 1):
-        if block is not None and step.end not in REFUSED_ENDS:
-            lying[number] = replace(block, order=number)
-        for rest in step.rests:
-            one = lying[rest.step]
-            place = origin_m(one.type, rest.euler_deg, rest.center_cm)
-            lying[rest.step] = replace(one, position_m=place, euler_deg=rest.euler_deg)
-        worlds.append(tuple(lying.values()))
-    return worlds
-
-
 @pytest.mark.parametrize("baseline", ["oracle-noise-1cm", "stack", "oracle-2d"])
 def test_where_blocks_came_to_lie_follows_from_what_each_step_moved(built_in, baseline):
-    item = built_in[0]
-    track = poses()
-    subject = PlanSubject(item.scene, item.candidates)
-    text = POSE_RULES[baseline](subject, np.random.default_rng(1))
+    item, track = built_in[0], poses()
+    text = POSE_RULES[baseline](track.subject_of(item), np.random.default_rng(1))
     found = track.judge(item, text)
-    steps = parse_poses(text, len(item.candidates)).steps
-    blocks = [put(step, item.candidates) for step in steps]
-    worlds = execute(blocks).worlds
-    record = judged(track, item, begun("s", track, "m", item, 0, None), found)
-    for world, again in zip(worlds, worlds_of(blocks, record.pose.steps), strict=True):
-        assert [block.order for block in again] == [block.order for block in world]
-        for one, other in zip(world, again, strict=True):
+    blocks = [put(step, item.candidates) for step in parse_poses(text, 16).steps]
+    fields, worlds = begun("s", track, "m", item, 0, None), execute(blocks).worlds
+    record = judged(track, item, fields, found)
+    for n, world in enumerate(worlds, 1):
+        ended = record.pose.model_copy(update={"steps": record.pose.steps[:n]})
+        built = record.model_copy(update={"pose": ended}).built(item)
+        for one, other in zip(world, built, strict=True):
             start, end = Pose.goal(one), Pose.goal(other)
             assert start.distance_m(end) < 0.0012
             assert start.angle_deg(end) < 1.1

@@ -36,17 +36,10 @@ def test_blocks_become_messages_with_captioned_pictures_before_the_user_text(tmp
     )
     bare = prompt(tmp_path, "{% block system %} \n {% endblock %}{% block user %}a{% endblock %}")
     assert bare.messages((GOAL,), FACTS) == (Message("user", (GOAL, "a")),)
-
-
-@pytest.mark.parametrize(
-    ("body", "said"),
-    [
-        (MACROS + "{% block user %}{{ twice(rules) }}{% endblock %}", "RR"),
-        ("{% for p in pictures %}{{ loop.index }} {{ p }};{% endfor %}", "1 goal;2 candidates;"),
-    ],
-)
-def test_blocks_use_loops_and_macros(tmp_path, body, said):
-    assert prompt(tmp_path, body).messages((), FACTS) == (Message("user", (said,)),)
+    loop = "{% for p in pictures %}{{ loop.index }} {{ twice(p) }};{% endfor %}{{ rules }}"
+    macros = prompt(tmp_path, MACROS + f"{{% block user %}}{loop}{{% endblock %}}")
+    said = "1 goalgoal;2 candidatescandidates;R"
+    assert macros.messages((), FACTS) == (Message("user", (said,)),)
 
 
 @given(first=st.text("ab", max_size=3), second=st.text("ab", max_size=3))

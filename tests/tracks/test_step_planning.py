@@ -3,7 +3,6 @@
 import asyncio
 import functools
 import json
-import re
 import zlib
 from typing import get_args
 
@@ -20,7 +19,7 @@ from phyblock.scoring.steps import MOVE_OUTCOMES
 from phyblock.tracks.pictures import Workshop
 from phyblock.tracks.step_planning import ENDINGS, STEP_RULES, Feedback, PastStep
 from phyblock.types import SETTINGS
-from tests.parsing.test_replies import REPLIES
+from tests.parsing.test_replies import ROWS
 from tests.shipped import TASKS, official_tasks
 from tests.tracks.conftest import seesaw, track_of
 
@@ -138,9 +137,6 @@ def test_an_episode_goes_the_same_way_in_json(operations):
     [
         (OPEN, scripted(*["Move(6)"] * 50), "max_steps", 6),
         ({"max_steps": 4, "max_failures": 9}, scripted(*["?"] * 50), "max_steps", 4),
-        ({"max_failures": 3, "max_repeats": None}, scripted(*["Move(6)"] * 50), "max_failures", 3),
-        ({"max_failures": 2}, scripted("Move(1)", "Move(6)", "?", "Move(3)"), "max_failures", 3),
-        ({"max_failures": 9, "max_repeats": 2}, scripted(*["Move(6)"] * 50), "max_repeats", 2),
         ({"max_failures": 9, "max_repeats": 2},
          scripted("Move(6)", "Move(5)", "Move(6)", "Move(6)"), "max_repeats", 4),
         ({"max_steps": 3}, scripted("Move(1)", "Move(1)", "Move(3)"), "completed", 3),
@@ -154,7 +150,7 @@ def test_limits_end_an_episode(limits, agent, ending, steps):
 def test_no_hostile_reply_stops_an_episode():
     """Each of them has its named outcome, and what follows is played as if it had not been."""
     allowed = {*MOVE_OUTCOMES, *MOVE_PROBLEMS, "done"}
-    for text, _ in REPLIES:
+    for _, _, text in ROWS:
         fields, _ = play(tower("red", "blue"), scripted(text, "Move(1)", "Move(3)"))
         assert set(fields["outcomes"]) <= allowed, text
         expected = "done" if fields["outcomes"][0] == "done" else "completed"
@@ -175,21 +171,18 @@ def test_whatever_is_said_the_default_limits_end_it_the_same_way(texts):
     assert tp == fields["outcomes"].count("placed")
 
 
-@pytest.mark.parametrize("accepts", SETTINGS)
-def test_the_oracle_completes_every_built_in_scene(accepts):
+@pytest.mark.parametrize(
+    ("of", "accepts"), [(one, "A") for one in ("built-in", "official")] + [("built-in", "B")]
+)
+def test_the_oracle_completes_every_scene(of, accepts, request):
     """Also where orientations do not matter to the simulator, it makes no mistake in them."""
-    for task in TASKS:
+    is_ours = of == "built-in"
+    tasks = TASKS if is_ours else official_tasks(request.getfixturevalue("official_checkout"))
+    for task in tasks:
         fields, _ = play(task, baseline("oracle"), made(setting=accepts))
         assert fields["ending"] == "completed"
         for setting in SETTINGS:
             assert scores(fields, "attempted", setting) == (len(task.scene), 0, 0), task.scene.id
-
-
-def test_the_oracle_completes_every_official_scene(official_checkout):
-    for task in official_tasks(official_checkout):
-        fields, _ = play(task, baseline("oracle"), made())
-        assert fields["ending"] == "completed", task.scene.id
-        assert scores(fields, "attempted") == (len(task.scene), 0, 0)
 
 
 def test_a_turned_block_is_placed_in_b_and_wrong_in_a():
@@ -253,33 +246,14 @@ def test_outlines_are_as_many_as_an_episode_can_have():
     assert [len(list(made(**one).outlines(task))) for one in rules] == [4, 1]
 
 
-def past(*outcomes):
-    return [PastStep(n, outcome) for n, outcome in enumerate(outcomes, 1)]
-
-
-def text(message):
-    return next(part for part in message.parts if isinstance(part, str))
-
-
 def pictures(message):
     return [part.data for part in message.parts if isinstance(part, Image)]
-
-
-@pytest.mark.parametrize("n", [0, 1, 7])
-def test_every_earlier_step_is_told_and_the_state_is_seen_last(shop, n):
-    shown = [Image(name.encode(), name, 1, 1) for name in ("goal", "candidates", "current")]
-    messages = made(shop=shop).messages(tower(*["red"] * 4), shown, past(*["overflow"] * n))
-    assert [message.role for message in messages] == ["system", "user"]
-    assert pictures(messages[1]) == [b"goal", b"candidates", b"current"]
-    told = re.findall(r"^(\d+)\. Move\((\d+)\): it failed", text(messages[1]), re.MULTILINE)
-    assert told == [(str(step), str(step)) for step in range(1, n + 1)]
-    assert f"step {n + 1} of at most 8" in text(messages[1])
 
 
 @pytest.mark.parametrize("feedback", get_args(Feedback))
 def test_feedback_tells_no_more_than_it_may(feedback):
     outcomes = [*MOVE_OUTCOMES, *MOVE_PROBLEMS]
-    told = {outcome: past(outcome)[0].report(feedback) for outcome in outcomes}
+    told = {outcome: PastStep(1, outcome).report(feedback) for outcome in outcomes}
     if feedback == "none":
         assert set(told.values()) == {""}
         return
