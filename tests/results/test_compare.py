@@ -159,14 +159,10 @@ def test_runs_that_cannot_be_compared_are_refused(other, said):
     first = one_seed(*plans("alpha", {"000": 4}), models=["alpha"])
     with pytest.raises(SpecError, match=said):
         compare(first, other)
-
-
-def test_what_a_run_lacks_is_named():
-    run = one_seed(*plans("alpha", {"000": 4}), models=["alpha"])
     with pytest.raises(SpecError, match=r"found: vqa(?s:.*)allowed: full_planning"):
         compare(run_of([], manifest()), track="vqa")
     with pytest.raises(SpecError, match="needs two models"):
-        compare(run)
+        compare(first)
 
 
 def test_the_first_runs_policy_on_missing_replies_holds_for_both():

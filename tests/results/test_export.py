@@ -18,8 +18,6 @@ from phyblock.results.load import load_run
 from tests.web.factory import LEVELS, manifest, record, score, write_run
 from tests.workspace import csv_rows
 
-HF = "the package datasets is not installed"
-
 
 def asked(model, seed, right, key="sh-1"):
     question = {"id": "sh-1", "subtask": "SH", "category": "object_property"}
@@ -72,30 +70,26 @@ def test_rows_hold_what_was_asked_answered_and_counted(folder):
     assert frame.loc["full_planning/beta/000/s0", "error"] == "busy"
 
 
-def test_csv_and_parquet_come_back_as_the_same_rows(folder, tmp_path):
+def test_csv_parquet_and_datasets_come_back_as_the_same_rows(folder, tmp_path):
     run = load_run(folder)
-    (csv,), (parquet, _) = (
-        write_csv(run, tmp_path),
-        huggingface.write(tmp_path, "records", export_frame(run)),
-    )
+    frame, (csv,) = export_frame(run), write_csv(run, tmp_path)
+    parquet, _ = huggingface.write(tmp_path / "hf", "records", frame)
     from_csv, from_parquet = pd.read_csv(csv), pd.read_parquet(parquet)
     assert from_csv["sample"].tolist() == from_parquet["sample"].tolist()
     assert from_csv["tp_a"].fillna(-1).tolist() == from_parquet["tp_a"].fillna(-1).tolist()
     assert json.loads(from_csv["levels"][0]) == list(from_parquet["levels"][0]) == [1, 2]
+    rows = loaded(parquet, tmp_path, "train")
+    assert rows.column_names == list(frame.columns)
+    assert rows["sample"][:] == frame["sample"].tolist()
+    assert (rows["levels"][0], rows["tp_a"][2:4]) == ([1, 2], [1, 1])
+    assert (rows["tp_a"][-3:], rows["answer_correct"][-2:]) == ([None] * 3, [True, False])
 
 
-def test_a_hugging_face_dataset_has_the_right_rows(folder, tmp_path):
-    datasets = pytest.importorskip("datasets", reason=HF)
-    frame = export_frame(load_run(folder))
-    parquet, _ = huggingface.write(tmp_path / "hf", "records", frame)
-    cache = str(tmp_path / "cache")
-    for rows in [datasets.load_dataset(str(parquet.parent), cache_dir=cache, split="train")]:
-        assert rows.column_names == list(frame.columns)
-        assert rows["sample"][:] == frame["sample"].tolist()
-        assert rows["levels"][0] == [1, 2]
-        assert rows["tp_a"][2:4] == [1, 1]
-        assert rows["tp_a"][-3:] == [None, None, None]
-        assert rows["answer_correct"][-2:] == [True, False]
+def loaded(parquet, folder, split):
+    """The rows of a file as the package datasets reads them."""
+    datasets = pytest.importorskip("datasets", reason="the package datasets is not installed")
+    cache = str(folder / "cache")
+    return datasets.load_dataset(str(parquet.parent), cache_dir=cache, split=split)
 
 
 def test_a_tsv_file_is_as_vlmevalkit_reads_it(question_set, towers, tmp_path):
@@ -130,27 +124,18 @@ def test_a_tsv_file_is_as_vlmevalkit_reads_it(question_set, towers, tmp_path):
                 assert row[letter] == option
 
 
-def test_a_hugging_face_dataset_has_questions_and_pictures(question_set, towers, tmp_path):
-    datasets = pytest.importorskip("datasets", reason=HF)
-    out, asked_of = tmp_path / "out", str(question_set.root)
+def test_a_hugging_face_dataset_has_questions_scenes_and_pictures(question_set, towers, tmp_path):
+    out, asked_of = tmp_path / "questions", str(question_set.root)
     parquet, _ = huggingface.write_questions(out, asked_of, str(towers.root), None, 128)
-    cache = str(tmp_path / "cache")
-    for rows in [datasets.load_dataset(str(parquet.parent), cache_dir=cache, split="test")]:
-        assert rows["id"][:] == [task.key for task in question_set.tasks]
-        for row, task in zip(rows, question_set.tasks, strict=True):
-            assert row["answer"] == task.question.answer_letters
-            assert row["options"] == list(task.question.options)
-            assert [image.size for image in row["images"]] == [(128, 128)] * len(row["labels"])
-
-
-def test_scenes_with_their_pictures_and_all_that_is_known_of_them(towers, tmp_path):
-    datasets = pytest.importorskip("datasets", reason=HF)
-    parquet, card = huggingface.write_scenes(tmp_path / "out", str(towers.root), None, 128)
-    cache = str(tmp_path / "cache")
-    rows = datasets.load_dataset(str(parquet.parent), cache_dir=cache, split="test")
+    rows = loaded(parquet, tmp_path, "test")
+    assert rows["id"][:] == [task.key for task in question_set.tasks]
+    for row, task in zip(rows, question_set.tasks, strict=True):
+        assert row["answer"] == task.question.answer_letters
+        assert row["options"] == list(task.question.options)
+        assert [image.size for image in row["images"]] == [(128, 128)] * len(row["labels"])
+    parquet, card = huggingface.write_scenes(tmp_path / "scenes", str(towers.root), None, 128)
+    rows = loaded(parquet, tmp_path, "test")
     assert "configs:" in card.read_text("utf-8")
-    lines = (towers.root / "scenes.jsonl").read_text("utf-8").splitlines()
     assert [json.loads(one)["id"] for one in rows["scene"]] == rows["id"][:]
-    assert len(rows) == len(lines)
-    for name in ("goal", "candidates"):
-        assert rows[0][name].size == (128, 128)
+    assert len(rows) == len((towers.root / "scenes.jsonl").read_text("utf-8").splitlines())
+    assert {rows[0][name].size for name in ("goal", "candidates")} == {(128, 128)}

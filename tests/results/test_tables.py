@@ -87,33 +87,21 @@ def test_costs_are_of_what_is_known_and_say_how_much_is_not():
         record(scene="002", cached=True, latency_s=9.0, attempts=0),
         record(scene="003", outcome="api_error"),
         record("beta", scene="000", prompt_tokens=0, completion_tokens=0, cost_usd=0.0, attempts=3),
-    ]
-    table = coverage_frame(run_of(records, manifest())).set_index("model")
-    alpha = table.loc["alpha"]
-    assert (alpha["prompt_tokens"], alpha["completion_tokens"]) == (15, 6)
-    assert (alpha["tokens_unknown"], alpha["cost_unknown"]) == (1, 0)
-    assert (alpha["cost_usd"], alpha["latency_median_s"]) == (0.75, 1.5)
-    assert (alpha["cached"], alpha["attempts"], alpha["replies"]) == (1, 2, 3)
-    assert pd.isna(alpha["reasoning_tokens"])
-    beta = table.loc["beta"]
-    assert (beta["cost_usd"], beta["prompt_tokens"], beta["attempts"]) == (0, 0, 3)
-
-
-def test_an_unknown_cost_is_never_shown_as_zero():
-    facts = manifest(models=["unknown", "free", "dear", "cached"])
-    records = [
         record("unknown"),
-        record("free", cost_usd=0.0),
-        record("dear", cost_usd=1234.5),
-        record("cached", cost_usd=0.25, cached=True, attempts=0),
     ]
-    view = make_tables(run_of(records, facts), ["cost"])["cost"]
+    run = run_of(records, manifest(models=["alpha", "beta", "unknown"]))
+    table = coverage_frame(run).set_index("model")
+    wanted = {"prompt_tokens": 15, "completion_tokens": 6, "tokens_unknown": 1, "cost_unknown": 0}
+    wanted |= {"cost_usd": 0.75, "latency_median_s": 1.5, "cached": 1, "attempts": 2, "replies": 3}
+    assert table.loc["alpha", list(wanted)].to_dict() == wanted
+    assert pd.isna(table.loc["alpha", "reasoning_tokens"])
+    assert table.loc["beta", ["cost_usd", "prompt_tokens", "attempts"]].tolist() == [0, 0, 3]
+    view = make_tables(run, ["cost"])["cost"]
     places = [n for n, column in enumerate(view.columns) if column.group == "Cost (USD)"]
     assert {row[0]: tuple(row[n] for n in places) for row in view.rows} == {
+        "alpha": ("0.7500", "37.50"),
+        "beta": ("0.00", "0.00"),
         "unknown": (NO_VALUE, NO_VALUE),
-        "free": ("0.00", "0.00"),
-        "dear": ("1,234.50", "123,450.00"),
-        "cached": ("0.00", "25.00"),
     }
 
 
@@ -198,7 +186,7 @@ TABLE = TextTable(
 )
 
 
-def test_latex_by_hand():
+def test_latex_and_markdown_by_hand():
     assert to_latex(TABLE, "x").splitlines()[8:-2] == [
         r"\begin{tabular}{@{}lrr@{}}",
         r"\toprule",
@@ -212,16 +200,13 @@ def test_latex_by_hand():
         r"\end{tabular}}}",
         r"\par\smallskip\raggedright\footnotesize",
     ]
-
-
-def test_markdown_by_hand():
-    assert to_markdown(TABLE) == (
-        "**Precision &amp; recall (%)**\n"
-        "\n"
-        "| Model | Level-1 Prec | Level-1 F1 |\n"
-        "| --- | --: | --: |\n"
-        "| gpt\\_4o\\|x | 9.5 | 100.0 ± 12.5 |\n"
-        "| \\[b\\]\\* | \N{EN DASH} | 7.0 ± 0.5 |\n"
-        "\n"
-        "- 100 % of \\<all\\>.\n"
-    )
+    assert to_markdown(TABLE).splitlines() == [
+        "**Precision &amp; recall (%)**",
+        "",
+        "| Model | Level-1 Prec | Level-1 F1 |",
+        "| --- | --: | --: |",
+        "| gpt\\_4o\\|x | 9.5 | 100.0 ± 12.5 |",
+        "| \\[b\\]\\* | \N{EN DASH} | 7.0 ± 0.5 |",
+        "",
+        "- 100 % of \\<all\\>.",
+    ]

@@ -21,7 +21,7 @@ from phyblock.tracks.base import Judgement, SceneTrack
 from phyblock.tracks.full_planning import FullPlanning
 from phyblock.tracks.measures import LayoutColumn, Measure, SampleCounts, TrackReport
 from phyblock.web.board import SiteRun, Sources, board_of, entries_of, values_of
-from tests.workspace import call, write_lines, write_questions
+from tests.workspace import call, write_questions
 
 
 @pytest.fixture
@@ -134,23 +134,6 @@ def first_is_placed(_, record):
 
 def is_right(_, record):
     return record.answer.correct, 1
-
-
-def test_an_episode_that_would_have_asked_otherwise_is_no_longer_final(here, add):
-    here.write_suite(tracks=["step_planning"], steps={"physics": "off"}, levels=[3])
-    assert not call("run", "suite.yaml", "--out", here.out, "--no-report")
-    counted = SampleCounts("first_steps", ("placed", "n"), sample=first_is_placed)
-    add("step_planning", Measure("first", "First", counted, ratio_of))
-    lines = here.records()
-    lines[0]["turns"][0]["reply"]["text"] = "Done"
-    write_lines(here.out / "records.jsonl", lines)
-    told = []
-    rescore(here.out, report=told.append)
-    first, *others = here.records()
-    assert [text.partition(" this")[0] for text in told] == ["Step planning: in 1 episode"]
-    assert (first["outcome"], first["error"]["kind"]) == ("api_error", "retryable")
-    assert first["turns"] == lines[0]["turns"]
-    assert not any(line["error"] for line in others)
 
 
 @pytest.mark.parametrize(
