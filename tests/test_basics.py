@@ -8,19 +8,18 @@ import os
 import signal
 import time
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from functools import partial
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.domain.blocks import euler_deg_to_matrix
+from phyblock.domain.scene import Block
 from phyblock.errors import ModelError, PhyblockError, StoreError
 from phyblock.making.questions.guesses import text_features
-from phyblock.scoring.pose import Piece, PoseFit, overlap_volume, placed
-from phyblock.sim.geometry import collision_pieces
+from phyblock.scoring.pose import PoseFit, overlap_volume
 from phyblock.text import csv_cell, one_line, plain_sum
 from phyblock.tracks.pose_planning import FITS
 from phyblock.workers import Shards, open_workers
@@ -89,9 +88,10 @@ def texts():
 
 def solids():
     """The overlap of two arches, which are three pieces each or more."""
-    arch = [Piece(p.vertices_m, p.face_normals) for p in collision_pieces("arch")]
-    turns = (euler_deg_to_matrix((7.0 * n, 11.0 * n, 13.0 * n)) for n in range(5))
-    return [overlap_volume(arch, placed(arch, turn, np.full(3, 0.003))) for turn in turns]
+    arch = Block(1, "arch", "red", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (), 1)
+    moved = replace(arch, position_m=(0.003, 0.003, 0.003))
+    turns = ((7.0 * n, 11.0 * n, 13.0 * n) for n in range(5))
+    return [overlap_volume(arch, replace(moved, euler_deg=turn)) for turn in turns]
 
 
 def fits():

@@ -6,21 +6,15 @@ volumes of intersections of convex pieces.
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple, get_args
+from typing import Literal, get_args
 
 import numpy as np
 
-from phyblock.domain.blocks import (
-    SHAPES,
-    BlockType,
-    Euler,
-    euler_deg_to_matrix,
-    symmetries,
-    turn_deg,
-)
+from phyblock.domain.blocks import SHAPES, euler_deg_to_matrix, symmetries, turn_deg
 from phyblock.domain.scene import Block, CandidateSet, Scene
 from phyblock.scoring.plan import Floats, Goal
 from phyblock.scoring.pose_matching import (
@@ -29,10 +23,11 @@ from phyblock.scoring.pose_matching import (
     Alignment,
     Motion,
     Nearness,
-    Poses,
     cheapest,
     matched,
 )
+from phyblock.sim.contact import clip, pieces_of
+from phyblock.sim.geometry import ConvexPiece, centers_m, cross
 from phyblock.text import plain_sum
 from phyblock.types import StepEnd
 
@@ -45,15 +40,6 @@ _CM = 100.0
 _DIGITS = 4
 _MOST_COUNTED = 8
 _SAME_CM, _SAME_DEG = 1e-7, 1e-5
-
-
-@dataclass(frozen=True)
-class Laid:
-    """A step as a rigid body: candidate number, origin of its body frame [m], Euler angles."""
-
-    candidate: int
-    position_m: tuple[float, float, float]
-    euler_deg: Euler
 
 
 @dataclass(frozen=True)
@@ -89,65 +75,69 @@ class PoseScore:
 class PoseScorer:
     """Scores plans with poses for one scene; build once, use for every model and seed.
 
-    Steps have the orientation of their candidates. `pieces_of` returns the convex pieces of a block
-    in its body frame.
+    Steps have the orientation of their candidates.
     """
 
-    def __init__(
-        self,
-        scene: Scene,
-        candidates: CandidateSet,
-        pieces_of: Callable[[BlockType], Sequence[Piece]],
-    ) -> None:
-        self._types = {n: one.type for n, one in enumerate(candidates.candidates, 1)}
+    def __init__(self, scene: Scene, candidates: CandidateSet) -> None:
         self._blocks = scene.blocks
         self.goal = Goal(scene, candidates, "A")
-        self._pieces_of = pieces_of
-        self._poses = _poses([(b.type, b.position_m, b.euler_deg) for b in scene.blocks])
 
-    def score(self, steps: Sequence[Laid]) -> tuple[PoseScore, ...]:
-        """Return the score in each frame. Raises KeyError for a step that names no candidate."""
-        types = [self._types[step.candidate] for step in steps]
-        if not steps:
-            none = (0,) * len(TOLERANCES_CM)
-            return tuple(PoseScore(f, (), none, len(self._blocks), Motion()) for f in POSE_FRAMES)
-        poses = _poses(
-            [(t, step.position_m, step.euler_deg) for t, step in zip(types, steps, strict=True)]
-        )
-        equal = np.zeros((len(steps), len(self._blocks)), dtype=bool)
-        for place, step in enumerate(steps):
-            equal[place, list(self.goal.equal_to[step.candidate])] = True
-        turns = tuple(symmetries(block_type) for block_type in types)
-        alignment = Alignment(poses, self._poses, equal, turns)
-        numbers = [step.candidate for step in steps]
-        absolute = self._scored("absolute", numbers, types, alignment, Motion())
+    def score(
+        self, numbers: Sequence[int], blocks: Sequence[Block | None]
+    ) -> tuple[PoseScore, ...]:
+        """Return the score in each frame of a plan: the number of each step's candidate, and its
+        block at its pose, None if no candidate has the number.
+        """
+        given = [(n, block) for n, block in zip(numbers, blocks, strict=True) if block is not None]
+        if not given:
+            fits, none = (None,) * len(numbers), (0,) * len(TOLERANCES_CM)
+            return tuple(PoseScore(f, fits, none, len(self._blocks), Motion()) for f in POSE_FRAMES)
+        kept, laid = zip(*given, strict=True)
+        plan = _Plan(self.goal, kept, laid, self._blocks)
+        absolute = plan.scored("absolute", Motion())
         aligned: PoseScore | None = None
-        for most, motion in alignment.likely_motions()[:_MOST_COUNTED]:
+        for most, motion in plan.alignment.likely_motions()[:_MOST_COUNTED]:
             # A valid order has no more steps within a tolerance than an arbitrary one.
             if aligned is not None and sum(aligned.right) >= most:
                 break
-            score = self._scored("aligned", numbers, types, alignment, motion)
+            score = plan.scored("aligned", motion)
             if aligned is None or sum(score.right) > sum(aligned.right):
                 aligned = score
         if aligned is None or sum(absolute.right) > sum(aligned.right):
             still = tuple(fit and replace(fit, iou=None) for fit in absolute.fits)
             aligned = replace(absolute, frame="aligned", fits=still)
-        return absolute, aligned
+        scores = []
+        for score in (absolute, aligned):
+            found = iter(score.fits)
+            whole = tuple(None if block is None else next(found) for block in blocks)
+            scores.append(replace(score, fits=whole))
+        return tuple(scores)
 
-    def _scored(
-        self,
-        frame: PoseFrame,
-        numbers: Sequence[int],
-        types: Sequence[BlockType],
-        alignment: Alignment,
-        motion: Motion,
-    ) -> PoseScore:
-        poses, near = alignment.moved(motion)
-        vertices = matched(self.goal, numbers, near)
+
+class _Plan:
+    """The steps of a plan that name a candidate, against the goal."""
+
+    def __init__(
+        self, goal: Goal, numbers: Sequence[int], steps: Sequence[Block], blocks: Sequence[Block]
+    ) -> None:
+        self._goal, self._numbers, self._steps, self._blocks = goal, numbers, steps, blocks
+        turns = np.array([euler_deg_to_matrix(block.euler_deg) for block in blocks])
+        equal = np.zeros((len(steps), len(blocks)), dtype=bool)
+        turn = np.zeros(equal.shape)
+        for step, (number, block) in enumerate(zip(numbers, steps, strict=True)):
+            equal[step, list(goal.equal_to[number])] = True
+            same = euler_deg_to_matrix(block.euler_deg) @ symmetries(block.type)
+            cosines = (np.einsum("kij,gij->gk", same, turns).max(axis=1) - 1) / 2
+            turn[step] = np.degrees(np.arccos(np.clip(cosines, -1.0, 1.0)))
+        self.alignment = Alignment(centers_m(steps) * _CM, centers_m(blocks) * _CM, turn, equal)
+
+    def scored(self, frame: PoseFrame, motion: Motion) -> PoseScore:
+        """Return the score after a motion; volumes are only computed of the plan as given."""
+        centers_cm, near = self.alignment.moved(motion)
+        vertices = matched(self._goal, self._numbers, near)
+        has_iou = frame == "absolute"
         fits = tuple(
-            None
-            if vertex is None
-            else self._fit(near, poses, step, vertex, types[step] if frame == "absolute" else None)
+            None if vertex is None else self._fit(near, centers_cm, step, vertex, has_iou=has_iou)
             for step, vertex in enumerate(vertices)
         )
         within = [int(near.within[s, v]) for s, v in enumerate(vertices) if v is not None]
@@ -157,37 +147,19 @@ class PoseScorer:
         return PoseScore(frame, fits, right, len(self._blocks), motion)
 
     def _fit(
-        self, near: Nearness, poses: Poses, step: int, vertex: int, block_type: BlockType | None
+        self, near: Nearness, centers_cm: Floats, step: int, vertex: int, *, has_iou: bool
     ) -> PoseFit:
-        """The fit of a step, with its volume where the type is given."""
-        off = poses.centers_cm[step] - self._poses.centers_cm[vertex]
+        off = centers_cm[step] - self.alignment.goal_cm[vertex]
         distance, turn = float(near.distance_cm[step, vertex]), float(near.turn_deg[step, vertex])
-        iou = None if block_type is None else 1.0
-        if block_type is not None and (distance > _SAME_CM or turn > _SAME_DEG):
-            iou = round(self._iou(block_type, poses, step, vertex), _DIGITS)
+        iou = 1.0 if has_iou else None
+        if has_iou and (distance > _SAME_CM or turn > _SAME_DEG):
+            one, other = self._steps[step], self._blocks[vertex]
+            shared = overlap_volume(one, other)
+            share = min(1.0, shared / (2 * SHAPES[one.type].volume_m3 - shared))
+            iou = round(share, _DIGITS)
         values = (distance, float(np.hypot(off[0], off[1])), float(off[2]), turn)
         far, sideways, up, by = (round(value, _DIGITS) + 0.0 for value in values)
         return PoseFit(vertex, far, sideways, up, by, iou)
-
-    def _iou(self, block_type: BlockType, poses: Poses, step: int, vertex: int) -> float:
-        """Intersection over union of a step's block and the goal's."""
-        shape = SHAPES[block_type]
-        solids = []
-        for one, place in ((poses, step), (self._poses, vertex)):
-            rotation = one.rotations[place]
-            origin = one.centers_cm[place] / _CM - rotation @ np.array(shape.center_of_mass_m)
-            solids.append(placed(self._pieces_of(block_type), rotation, origin))
-        shared = overlap_volume(*solids)
-        return min(1.0, shared / (2 * shape.volume_m3 - shared))
-
-
-def _poses(bodies: Sequence[tuple[BlockType, tuple[float, float, float], Euler]]) -> Poses:
-    rotations = np.array([euler_deg_to_matrix(euler) for _, _, euler in bodies])
-    centers = [
-        np.array(position) + rotation @ np.array(SHAPES[block_type].center_of_mass_m)
-        for (block_type, position, _), rotation in zip(bodies, rotations, strict=True)
-    ]
-    return Poses(np.array(centers) * _CM, rotations)
 
 
 PoseError = Literal[
@@ -263,23 +235,26 @@ def blocks_reached(
     goal: Sequence[Block], blocks: Sequence[Block], within_cm: float, within_deg: float
 ) -> int:
     """Return how many goal blocks can each be matched to a near enough block of its kind."""
-
-    def is_near(one: Block, other: Block) -> bool:
-        if one.kind != other.kind:
-            return False
-        rotations = [euler_deg_to_matrix(block.euler_deg) for block in (one, other)]
-        middle = np.array(SHAPES[one.type].center_of_mass_m)
-        places = [
-            np.array(block.position_m) + rotation @ middle
-            for block, rotation in zip((one, other), rotations, strict=True)
-        ]
-        if math.dist(*places) * _CM > within_cm:
-            return False
-        return turn_deg(one.type, *rotations) <= within_deg
-
-    near = np.array([[is_near(one, other) for other in blocks] for one in goal])
-    if not near.size:
+    if not goal or not blocks:
         return 0
+    wanted, found = (
+        [
+            (block, center, euler_deg_to_matrix(block.euler_deg))
+            for block, center in zip(some, centers_m(some), strict=True)
+        ]
+        for some in (goal, blocks)
+    )
+    near = np.array(
+        [
+            [
+                one.kind == other.kind
+                and math.dist(place, there) * _CM <= within_cm
+                and turn_deg(one.type, turn, turned) <= within_deg
+                for other, there, turned in found
+            ]
+            for one, place, turn in wanted
+        ]
+    )
     return sum(bool(near[pair]) for pair in cheapest((~near).astype(np.float64)))
 
 
@@ -288,44 +263,32 @@ _FLAT = 1e-9
 """Points closer to a plane than this share of a block's size lie on it [m]."""
 
 
-class Piece(NamedTuple):
-    """A convex polytope: corners (n, 3), and a unit normal (k, 3) for each pair of faces."""
-
-    corners: Floats
-    normals: Floats
+def overlap_volume(one: Block, other: Block) -> float:
+    """Volume that two blocks share [m3]."""
+    return plain_sum(_shared(*pair) for pair in itertools.product(pieces_of(one), pieces_of(other)))
 
 
-def placed(pieces: Sequence[Piece], rotation: Floats, position: Floats) -> tuple[Piece, ...]:
-    """Pieces turned by `rotation` (3, 3), then shifted to `position` (3,)."""
-    return tuple(Piece(p.corners @ rotation.T + position, p.normals @ rotation.T) for p in pieces)
-
-
-def overlap_volume(one: Sequence[Piece], other: Sequence[Piece]) -> float:
-    """Volume that two solids share, each given by convex pieces that do not overlap."""
-    return plain_sum(_shared(first, second) for first in one for second in other)
-
-
-def _shared(one: Piece, other: Piece) -> float:
+def _shared(one: ConvexPiece, other: ConvexPiece) -> float:
     apart = np.maximum(
-        one.corners.min(axis=0) - other.corners.max(axis=0),
-        other.corners.min(axis=0) - one.corners.max(axis=0),
+        one.vertices_m.min(axis=0) - other.vertices_m.max(axis=0),
+        other.vertices_m.min(axis=0) - one.vertices_m.max(axis=0),
     )
     if apart.max() >= 0:
         return 0.0
     faces = _faces(one)
-    for normal in (*other.normals, *-other.normals):
-        faces = _cut(faces, normal, float((other.corners @ normal).max()))
+    for normal in (*other.face_normals, *-other.face_normals):
+        faces = _cut(faces, normal, float((other.vertices_m @ normal).max()))
         if len(faces) < 4:
             return 0.0
     return _volume(faces)
 
 
-def _faces(piece: Piece) -> list[Floats]:
+def _faces(piece: ConvexPiece) -> list[Floats]:
     """The faces of a polytope, each a polygon (n, 3) in order around it."""
     faces = []
-    for normal in (*piece.normals, *-piece.normals):
-        heights = piece.corners @ normal
-        face = piece.corners[heights > heights.max() - _FLAT]
+    for normal in (*piece.face_normals, *-piece.face_normals):
+        heights = piece.vertices_m @ normal
+        face = piece.vertices_m[heights > heights.max() - _FLAT]
         # A semi-cylinder has a face on only one side of a pair.
         if len(face) > 2:
             faces.append(_round(face, normal))
@@ -337,17 +300,10 @@ def _round(points: Floats, normal: Floats) -> Floats:
     if len(points) == 3:
         return points
     helper = _AXES[int(np.argmin(np.abs(normal)))]
-    right = _cross(normal, helper)
+    right = cross(normal, helper)
     spread = points - points.sum(axis=0) / len(points)
-    angles = np.arctan2(spread @ _cross(normal, right), spread @ right)
+    angles = np.arctan2(spread @ cross(normal, right), spread @ right)
     return points[np.argsort(angles, kind="stable")]
-
-
-def _cross(one: Floats, other: Floats) -> Floats:
-    """Vector products along the last axis; `np.cross` is several times slower on a few."""
-    a, b, c = one[..., 0], one[..., 1], one[..., 2]
-    x, y, z = other[..., 0], other[..., 1], other[..., 2]
-    return np.stack([b * z - c * y, c * x - a * z, a * y - b * x], axis=-1)
 
 
 def _cut(faces: list[Floats], normal: Floats, limit: float) -> list[Floats]:
@@ -367,7 +323,7 @@ def _cut(faces: list[Floats], normal: Floats, limit: float) -> list[Floats]:
             kept.append(face)
             rim += list(face[on_plane])
             continue
-        polygon = _below(face, heights)
+        polygon = clip(face, heights, _FLAT)
         if len(polygon) > 2:
             kept.append(polygon)
         if len(polygon):
@@ -379,21 +335,6 @@ def _cut(faces: list[Floats], normal: Floats, limit: float) -> list[Floats]:
     return kept
 
 
-def _below(face: Floats, heights: Floats) -> Floats:
-    """The part of a polygon whose `heights` are not above zero."""
-    points = []
-    for i, height in enumerate(heights):
-        after = (i + 1) % len(face)
-        if height <= _FLAT:
-            points.append(face[i])
-        if (height < -_FLAT and heights[after] > _FLAT) or (
-            height > _FLAT and heights[after] < -_FLAT
-        ):
-            share = height / (height - heights[after])
-            points.append(face[i] + share * (face[after] - face[i]))
-    return np.array(points).reshape(-1, 3)
-
-
 def _volume(faces: list[Floats]) -> float:
     """Volume of a convex polytope: cones from a point inside to each of its faces."""
     if len(faces) < 4:
@@ -403,6 +344,6 @@ def _volume(faces: list[Floats]) -> float:
     total = 0.0
     for face in faces:
         legs = face - middle
-        fans = _cross(legs[1:-1] - legs[0], legs[2:] - legs[0])
+        fans = cross(legs[1:-1] - legs[0], legs[2:] - legs[0])
         total += abs(float((fans @ legs[0]).sum())) / 6
     return total

@@ -11,7 +11,6 @@ the position and direction of the plan.
 
 from __future__ import annotations
 
-import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -180,47 +179,29 @@ class Motion:
 
 
 @dataclass(frozen=True, eq=False)
-class Poses:
-    """Steps or goal blocks: centers of mass (n, 3) [cm] and rotations (n, 3, 3)."""
-
-    centers_cm: Floats
-    rotations: Floats
-
-
-@dataclass(frozen=True, eq=False)
 class Alignment:
     """The steps of a plan against a goal, and the motions of the whole plan between them.
 
-    `equal` (steps, blocks) is true where a step's candidate equals a block; `symmetries` are those
-    (k, 3, 3) of each step's block. Candidates keep the orientation in which they were shown.
+    `steps_cm` and `goal_cm` (n, 3) are centers of mass [cm]; `turn_deg` (steps, blocks) the least
+    turn of each step from each block [degrees], which no motion changes; `equal` is true where a
+    step's candidate equals a block. Candidates keep the orientation in which they were shown.
     """
 
-    steps: Poses
-    goal: Poses
+    steps_cm: Floats
+    goal_cm: Floats
+    turn_deg: Floats
     equal: NDArray[np.bool_]
-    symmetries: tuple[Floats, ...]
 
-    def moved(self, motion: Motion) -> tuple[Poses, Nearness]:
-        """The steps after `motion`, and their nearness to the goal blocks."""
-        centers = self.steps.centers_cm
+    def moved(self, motion: Motion) -> tuple[Floats, Nearness]:
+        """The centers of steps after `motion` [cm], and their nearness to the goal blocks."""
+        centers = self.steps_cm
         if motion != Motion():
             cosine, sine = np.cos(motion.turn_rad), np.sin(motion.turn_rad)
             centers = centers @ np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0, 0, 1]])
             centers[:, :2] += motion.shift_cm
-        apart = centers[:, None] - self.goal.centers_cm[None]
+        apart = centers[:, None] - self.goal_cm[None]
         distance = np.sqrt((apart**2).sum(axis=-1))
-        steps = Poses(centers, self.steps.rotations)
-        return steps, Nearness(distance, self._turn_deg, self.equal)
-
-    @functools.cached_property
-    def _turn_deg(self) -> Floats:
-        """The least turn of each step from each goal block, which no motion changes."""
-        turn = np.zeros(self.equal.shape)
-        for step, rotations in enumerate(self.symmetries):
-            same = self.steps.rotations[step] @ rotations
-            traces = np.einsum("kij,gij->gk", same, self.goal.rotations)
-            turn[step] = _angle_deg(traces.max(axis=1))
-        return turn
+        return centers, Nearness(distance, self.turn_deg, self.equal)
 
     def likely_motions(self) -> list[tuple[int, Motion]]:
         """Return motions, each with the number of tolerances its steps meet in any order.
@@ -255,8 +236,8 @@ class Alignment:
         With these weights, its fixed points are the peaks of a smooth count of tolerances, with a
         bell curve for each: distant pairs give way to those that can come within one more.
         """
-        one = self.steps.centers_cm[[s for s, _ in pairs], :2]
-        other = self.goal.centers_cm[[v for _, v in pairs], :2]
+        one = self.steps_cm[[s for s, _ in pairs], :2]
+        other = self.goal_cm[[v for _, v in pairs], :2]
         distance = np.array([near.distance_cm[pair] for pair in pairs])
         limits = np.array(TOLERANCES_CM)
         weight = (np.exp(-((distance[:, None] / limits) ** 2)) / limits**2).sum(axis=1)[:, None]
@@ -276,7 +257,7 @@ class Alignment:
 
     def _hypotheses(self) -> tuple[Floats, Floats]:
         """Turns (h,) [rad] and shifts (h, 2) [cm] that lay steps on equal blocks."""
-        p, q = self.steps.centers_cm[:, :2], self.goal.centers_cm[:, :2]
+        p, q = self.steps_cm[:, :2], self.goal_cm[:, :2]
         step, vertex = np.nonzero(self.equal)
         # Pairs of pairs, each once.
         first, second = np.triu_indices(len(step), 1)
@@ -311,7 +292,7 @@ class Alignment:
             turned = (np.cos(turns_rad), np.sin(turns_rad), *shifts_cm.T)
             return np.lexsort((*np.round(turned, _PLACE_DIGITS), far, -within))
 
-        p, q = self.steps.centers_cm, self.goal.centers_cm
+        p, q = self.steps_cm, self.goal_cm
         rise = (p[:, None, 2] - q[None, :, 2]) ** 2
         xy = _turned(p[:, :2], turns_rad[:, None]) + shifts_cm[:, None]
         apart = ((xy[:, :, None] - q[None, None, :, :2]) ** 2).sum(axis=-1) + rise
@@ -327,8 +308,3 @@ def _turned(points: Floats, turns_rad: Floats) -> Floats:
     cosine, sine = np.cos(turns_rad), np.sin(turns_rad)
     x, y = points.T
     return np.stack([cosine * x - sine * y, sine * x + cosine * y], axis=-1)
-
-
-def _angle_deg(traces: Floats) -> Floats:
-    angles: Floats = np.degrees(np.arccos(np.clip((traces - 1) / 2, -1.0, 1.0)))
-    return angles

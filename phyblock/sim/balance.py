@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from phyblock.domain.blocks import FRICTION, SHAPES, euler_deg_to_matrix
+from phyblock.domain.blocks import FRICTION, SHAPES
 from phyblock.domain.scene import Block
 from phyblock.errors import PhyblockError
 from phyblock.sim import certificate
@@ -43,7 +43,7 @@ from phyblock.sim.contact import (
     piece_pairs,
     pieces_of,
 )
-from phyblock.sim.geometry import cross
+from phyblock.sim.geometry import centers_m, cross
 
 Floats = NDArray[np.float64]
 
@@ -246,18 +246,9 @@ def _weights(
     """
     kg = np.array([SHAPES[b.type].mass_kg for b in blocks])
     factors = np.array([long if SHAPES[b.type].is_long else 1.0 for b in blocks])
-    centers = _centers_m(blocks)
+    centers = centers_m(blocks)
     centers[:, :2] += shift_m
     return _wrenches(centers, np.outer(kg * factors / kg.sum(), up)).ravel()
-
-
-def _centers_m(blocks: Sequence[Block]) -> Floats:
-    """The centers of mass of blocks, shape (n, 3) [m]."""
-    centers = np.zeros((len(blocks), 3))
-    for center, b in zip(centers, blocks, strict=True):
-        center += euler_deg_to_matrix(b.euler_deg) @ np.array(SHAPES[b.type].center_of_mass_m)
-        center += b.position_m
-    return centers
 
 
 class _Contacts(NamedTuple):
@@ -338,7 +329,7 @@ def _bodies(blocks: Sequence[Block]) -> tuple[Body, ...]:
     kg = [SHAPES[block.type].mass_kg for block in blocks]
     weights = [round(one / sum(kg) * certificate.ONE) for one in kg]
     is_long = [SHAPES[block.type].is_long for block in blocks]
-    return tuple(map(Body, weights, is_long, _exact(_centers_m(blocks))))
+    return tuple(map(Body, weights, is_long, _exact(centers_m(blocks))))
 
 
 def _stated(met: _Contacts) -> tuple[Contact, ...]:

@@ -267,10 +267,10 @@ def contact_corners_m(
     if margin_m < 0:
         ways = -margin_m / 2 * np.array([[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]])
         lower, upper = (_hull((one[:, None] + ways).reshape(-1, 2)) for one in (lower, upper))
-        shared = _clip(lower, upper)
+        shared = _inside(lower, upper)
     elif margin_m:
         for outline in (lower, upper):
-            shared = _clip(shared, outline, margin_m / 2)
+            shared = _inside(shared, outline, margin_m / 2)
     if len(shared) < 2:
         return np.empty((0, 3))
     return shared @ basis + (first.vertices_m @ direction).max() * direction
@@ -289,7 +289,7 @@ def _patches(
         heights = piece.vertices_m @ towards
         outlines.append(_hull(piece.vertices_m[heights > heights.max() - _PATCH_DEPTH_M] @ basis.T))
     lower, upper = outlines
-    shared = _clip(lower, upper) if len(upper) > 2 else _clip(upper, lower)
+    shared = _inside(lower, upper) if len(upper) > 2 else _inside(upper, lower)
     return lower, upper, shared, basis
 
 
@@ -319,24 +319,32 @@ def _hull(points: Floats) -> Floats:
     return np.array([*half(ordered)[:-1], *half(ordered[::-1])[:-1]])
 
 
-def _clip(subject: Floats, window: Floats, inset_m: float = 0.0) -> Floats:
-    """The part of a polygon, segment or point inside a convex polygon (Sutherland-Hodgman)."""
+def clip(corners: Floats, heights: Floats, flat_m: float = 0.0) -> Floats:
+    """The part of a polygon or segment (n, d) whose heights (n,) are not above zero
+    (Sutherland-Hodgman); corners within `flat_m` of zero are on the border.
+    """
+    kept = []
+    for i, height in enumerate(heights):
+        after = (i + 1) % len(corners)
+        if height <= flat_m:
+            kept.append(corners[i])
+        if (height < -flat_m and heights[after] > flat_m) or (
+            height > flat_m and heights[after] < -flat_m
+        ):
+            share = height / (height - heights[after])
+            kept.append(corners[i] + share * (corners[after] - corners[i]))
+    return np.array(kept).reshape(-1, corners.shape[1])
+
+
+def _inside(subject: Floats, window: Floats, inset_m: float = 0.0) -> Floats:
+    """The part of a polygon, segment or point inside a convex polygon."""
     if len(window) < 3 and not (len(window) == 2 and inset_m):
         return np.empty((0, 2))
     kept = subject
     for start, end in zip(window, np.roll(window, -1, axis=0), strict=True):
         along = end - start
-        inward = along if len(window) == 2 else np.array([-along[1], along[0]])
-        depths = (kept - start) @ inward - inset_m * np.linalg.norm(inward)
-        corners: list[Floats] = []
-        for i in range(len(kept)):
-            j = (i + 1) % len(kept)
-            if depths[i] >= 0:
-                corners.append(kept[i])
-            if (depths[i] > 0 > depths[j]) or (depths[i] < 0 < depths[j]):
-                share = depths[i] / (depths[i] - depths[j])
-                corners.append(kept[i] + share * (kept[j] - kept[i]))
-        kept = np.array(corners).reshape(-1, 2)
+        outward = -along if len(window) == 2 else np.array([along[1], -along[0]])
+        kept = clip(kept, (kept - start) @ outward + inset_m * np.linalg.norm(outward))
     return kept
 
 

@@ -25,7 +25,7 @@ from phyblock.domain.scene import Block
 from phyblock.errors import SimulationError
 from phyblock.sim.balance import prove_standing
 from phyblock.sim.contact import FIT_TOLERANCE_M, bounds_m, boxes_near, drop_height_m, piece_pairs
-from phyblock.sim.engine import Physics, PhysicsEngine, Pose, World, physics_engine
+from phyblock.sim.engine import Physics, PhysicsEngine, Pose, World, open_world, physics_engine
 from phyblock.sim.geometry import rounded, significant
 from phyblock.types import StepEnd
 
@@ -117,7 +117,7 @@ def _try_groups(parts: Sequence[Sequence[Block]], trial: Trial, quiet_s: float |
     """Let groups go one after another, under each setting in a world of its own."""
     settings = []
     for physics in trial.physics if parts else ():
-        with World(physics) as world:
+        with open_world(physics) as world:
             settings.append(Stability.of([_tried(world, one, trial, quiet_s) for one in parts]))
     return Stability.of(settings)
 
@@ -241,7 +241,7 @@ def _settled(blocks: tuple[Block, ...], trial: Trial, engine: PhysicsEngine) -> 
     fallen, shown = set[int](), tuple[Block, ...]()
     for physics in trial.physics:
         # A new world: how blocks tumble could depend on earlier contents of a used one.
-        with World(physics, engine) as world:
+        with open_world(physics, engine) as world:
             world.place(*blocks)
             wait(world, trial.duration_s)
             moved = movement(blocks, world.poses(), trial).fallen
@@ -258,14 +258,14 @@ def _settled(blocks: tuple[Block, ...], trial: Trial, engine: PhysicsEngine) -> 
 @functools.lru_cache(maxsize=_KEPT)
 def _stays(group: tuple[Block, ...], trial: Trial, engine: PhysicsEngine) -> bool:
     """True if a group, alone in the world, stays where it is under every setting."""
-    worlds = (_open_world(physics, engine) for physics in trial.physics)
+    worlds = (_kept_world(physics, engine) for physics in trial.physics)
     return not any(_tried(world, group, trial, QUIET_S).fallen for world in worlds)
 
 
 @functools.cache
-def _open_world(physics: Physics, engine: PhysicsEngine) -> World:
+def _kept_world(physics: Physics, engine: PhysicsEngine) -> World:
     """A world for groups, one after another: PyBullet takes longer to open one than to try one."""
-    return _OPEN.enter_context(World(physics, engine))
+    return _OPEN.enter_context(open_world(physics, engine))
 
 
 def _arrangement(group: Sequence[Block]) -> tuple[Block, ...]:
@@ -363,12 +363,11 @@ class Executor:
         physics: Physics | None = None,
     ) -> None:
         self._limits = limits or ExecutionLimits()
-        self._world = World(physics, engine)
+        self._world = open_world(physics, engine)
         self._resting: dict[int, Block] = {}
         self._steps = 0
 
     def __enter__(self) -> Executor:
-        self._world.__enter__()
         return self
 
     def __exit__(self, *error: object) -> None:

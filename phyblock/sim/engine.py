@@ -1,4 +1,4 @@
-"""Physics engines behind one protocol, in terms of blocks on a floor, and the choice of one.
+"""Physics engines behind one class, in terms of blocks on a floor, and the choice of one.
 
 The floor is the plane z = 0; poses are those of body frames. PyBullet is used if it is installed,
 else MuJoCo; the environment variable `PHYBLOCK_PHYSICS` chooses by name.
@@ -6,17 +6,16 @@ else MuJoCo; the environment variable `PHYBLOCK_PHYSICS` chooses by name.
 
 from __future__ import annotations
 
-import contextlib
 import functools
 import importlib
 import importlib.metadata
 import math
 import os
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from importlib.util import find_spec
-from typing import NamedTuple, Protocol, cast
+from typing import ClassVar, NamedTuple, Self, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,58 +106,102 @@ class Velocity(NamedTuple):
     angular_rad_s: Vector
 
 
-class Simulation(Protocol):
-    """Rigid blocks on a floor, by number; the same calls on one machine give the same bits."""
+class World(ABC):
+    """Rigid blocks on a floor, by their order; a context manager.
 
-    def add(self, number: int, block_type: BlockType, pose: Pose) -> None:
-        """Add a block at a pose, at rest; its number is above 0 and unused."""
+    Each physics engine is a subclass. Any number of worlds may be open at once, and the same calls
+    on one machine give the same bits. Raises SimulationError if it cannot be opened.
+    """
 
-    def remove(self, number: int) -> None:
+    name: ClassVar[str]
+    """The engine's name in `ENGINES`, and in the files of runs."""
+
+    def __init__(self, physics: Physics) -> None:
+        self.physics = physics
+        self._blocks: dict[int, Block] = {}
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._close()
+
+    def place(self, *blocks: Block) -> None:
+        """Put blocks at their goal poses, at rest, rounded to digits that machines agree on."""
+        for block in blocks:
+            goal = Pose.goal(block)
+            pose = Pose(rounded(goal.position_m), rounded(goal.quat_xyzw))
+            self._add(block.order, block.type, pose)
+            self._blocks[block.order] = block
+
+    def remove(self, order: int) -> None:
         """Remove a block."""
+        self._remove(order)
+        del self._blocks[order]
 
-    def step(self, n: int) -> None:
-        """Simulate `n` time steps."""
+    def step(self, duration_s: float) -> None:
+        """Simulate for `duration_s` [s], rounded to whole time steps."""
+        self._step(round(duration_s / self.physics.time_step_s))
 
-    def pose(self, number: int) -> Pose:
+    def fastest_m_s(self) -> float:
+        """Upper bound of the speed of the fastest corner [m/s]; 0 in an empty world."""
+        fastest = 0.0
+        for order, block in self._blocks.items():
+            shape, velocity = SHAPES[block.type], self.velocity(order)
+            reach_m = math.dist(shape.low_m, shape.high_m)
+            spin = math.hypot(*velocity.angular_rad_s) * reach_m
+            fastest = max(fastest, math.hypot(*velocity.linear_m_s) + spin)
+        return fastest
+
+    def poses(self) -> dict[int, Pose]:
+        """Return the current poses of all blocks, by order."""
+        return {order: self.pose(order) for order in self._blocks}
+
+    @abstractmethod
+    def pose(self, order: int) -> Pose:
         """Return the current pose of a block."""
 
-    def velocity(self, number: int) -> Velocity:
+    @abstractmethod
+    def velocity(self, order: int) -> Velocity:
         """Return the current velocity of a block."""
 
+    @abstractmethod
+    def _add(self, order: int, block_type: BlockType, pose: Pose) -> None:
+        """Add a block at a pose, at rest."""
 
-class PhysicsEngine(Protocol):
-    """A physics engine; any number of its simulations may be open at once."""
+    @abstractmethod
+    def _remove(self, order: int) -> None:
+        """Remove a block."""
 
-    def __hash__(self) -> int:
-        """Engines are hashable, since results are cached by engine."""
+    @abstractmethod
+    def _step(self, n: int) -> None:
+        """Simulate `n` time steps."""
 
-    @property
-    def name(self) -> str:
-        """Its name in `ENGINES`, and in the files of runs."""
-
-    def open(self, physics: Physics) -> AbstractContextManager[Simulation]:
-        """Open a floor without blocks for the context. Raises SimulationError if that fails."""
+    def _close(self) -> None:  # noqa: B027
+        """Free what the engine holds for this world."""
 
 
+PhysicsEngine = type[World]
+"""The class of an engine's worlds."""
 PHYSICS_VARIABLE = "PHYBLOCK_PHYSICS"
 REFERENCE_ENGINE = "pybullet"
 """The engine of the built-in data, and of records that name no engine."""
 
 
 class KnownEngine(NamedTuple):
-    """The class of an engine in the module of its name, its distribution, and install hint."""
+    """The subclass of `World` in the module of its name, its distribution, and install hint."""
 
-    factory: str
+    world: str
     distribution: str
     hint: str
 
 
 ENGINES: Mapping[str, KnownEngine] = {
     REFERENCE_ENGINE: KnownEngine(
-        "BulletEngine", "pybullet", "PyBullet has wheels for Python 3.11 on Linux, x86-64"
+        "BulletWorld", "pybullet", "PyBullet has wheels for Python 3.11 on Linux, x86-64"
     ),
     "mujoco": KnownEngine(
-        "MujocoEngine", "mujoco-core", "pip install 'phyblock[mujoco]', for Python 3.11 and newer"
+        "MujocoWorld", "mujoco-core", "pip install 'phyblock[mujoco]', for Python 3.11 and newer"
     ),
 }
 """The physics engines by the names of their libraries; the first installed is the default."""
@@ -179,13 +222,13 @@ def physics_engine() -> PhysicsEngine:
     if name not in installed_engines():
         hint = ENGINES[name].hint
         raise InputError(Problem(PHYSICS_VARIABLE, "is not installed", found=name, hint=hint))
-    return _made(name)
-
-
-@functools.cache
-def _made(name: str) -> PhysicsEngine:
     module = importlib.import_module(f"phyblock.sim.{name}")
-    return cast(PhysicsEngine, getattr(module, ENGINES[name].factory)())
+    return cast(PhysicsEngine, getattr(module, ENGINES[name].world))
+
+
+def open_world(physics: Physics | None = None, engine: PhysicsEngine | None = None) -> World:
+    """Open a floor without blocks in an engine, by default the one in use."""
+    return (engine or physics_engine())(physics or Physics())
 
 
 def described_engine() -> str:
@@ -207,56 +250,3 @@ def other_engine() -> str:
     """Return the engine in use, for messages, or "" if it is that of the built-in data."""
     is_usual = physics_engine().name == REFERENCE_ENGINE
     return "" if is_usual else f"the physics engine {described_engine()}"
-
-
-class World:
-    """Blocks on the ground in a simulation, named by their order; a context manager."""
-
-    def __init__(self, physics: Physics | None = None, engine: PhysicsEngine | None = None) -> None:
-        self.physics = physics or Physics()
-        self._engine = engine or physics_engine()
-        self._stack = contextlib.ExitStack()
-        self._blocks: dict[int, Block] = {}
-
-    def __enter__(self) -> World:
-        self._simulation = self._stack.enter_context(self._engine.open(self.physics))
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._blocks.clear()
-        self._stack.close()
-
-    def place(self, *blocks: Block) -> None:
-        """Put blocks at their goal poses, at rest, rounded to digits that machines agree on."""
-        for block in blocks:
-            goal = Pose.goal(block)
-            pose = Pose(rounded(goal.position_m), rounded(goal.quat_xyzw))
-            self._simulation.add(block.order, block.type, pose)
-            self._blocks[block.order] = block
-
-    def remove(self, order: int) -> None:
-        """Remove a block."""
-        self._simulation.remove(order)
-        del self._blocks[order]
-
-    def step(self, duration_s: float) -> None:
-        """Simulate for `duration_s` [s], rounded to whole time steps."""
-        self._simulation.step(round(duration_s / self.physics.time_step_s))
-
-    def fastest_m_s(self) -> float:
-        """Upper bound of the speed of the fastest corner [m/s]; 0 in an empty world."""
-        fastest = 0.0
-        for order, block in self._blocks.items():
-            shape, velocity = SHAPES[block.type], self._simulation.velocity(order)
-            reach_m = math.dist(shape.low_m, shape.high_m)
-            spin = math.hypot(*velocity.angular_rad_s) * reach_m
-            fastest = max(fastest, math.hypot(*velocity.linear_m_s) + spin)
-        return fastest
-
-    def pose(self, order: int) -> Pose:
-        """Return the current pose of a block."""
-        return self._simulation.pose(order)
-
-    def poses(self) -> dict[int, Pose]:
-        """Return the current poses of all blocks, by order."""
-        return {order: self.pose(order) for order in self._blocks}

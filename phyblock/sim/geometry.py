@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -208,6 +209,15 @@ def corners_m(
     )
     corners += np.array(position_m)
     return corners
+
+
+def centers_m(blocks: Sequence[Block]) -> NDArray[np.float64]:
+    """The centers of mass of blocks at their poses, shape (n, 3) [m]."""
+    centers = np.zeros((len(blocks), 3))
+    for center, b in zip(centers, blocks, strict=True):
+        center += euler_deg_to_matrix(b.euler_deg) @ np.array(SHAPES[b.type].center_of_mass_m)
+        center += b.position_m
+    return centers
 
 
 @functools.cache

@@ -7,9 +7,7 @@ friction cone; collision pieces shrunk slightly, so that blocks side by side do 
 
 from __future__ import annotations
 
-import contextlib
 import functools
-from collections.abc import Iterator
 from dataclasses import dataclass
 from types import ModuleType
 from typing import Any, cast
@@ -19,7 +17,7 @@ from numpy.typing import NDArray
 
 from phyblock.domain.blocks import SHAPES, BlockType, quat_xyzw_to_matrix
 from phyblock.errors import SimulationError
-from phyblock.sim.engine import Physics, Pose, Velocity
+from phyblock.sim.engine import Physics, Pose, Velocity, World
 from phyblock.sim.geometry import collision_pieces, principal_inertia_m2, rounded
 
 _SUBSTEPS = 4
@@ -31,17 +29,6 @@ _INSET_M = 0.00002  # Distance by which collision pieces are moved inward.
 _KEPT = 256
 
 Floats = NDArray[np.float64]
-
-
-class MujocoEngine:
-    """Opens simulations, each with its own data."""
-
-    name = "mujoco"
-
-    @contextlib.contextmanager
-    def open(self, physics: Physics) -> Iterator[_Simulation]:
-        """Open a floor without blocks."""
-        yield _Simulation(_loaded(), physics)
 
 
 @functools.cache
@@ -75,25 +62,28 @@ class _Body:
         return self.rotation @ np.array(SHAPES[self.type].center_of_mass_m)
 
 
-class _Simulation:
-    """Blocks on a plane, as `Simulation`; adding or removing a block starts a new model."""
+class MujocoWorld(World):
+    """Blocks on a plane; adding or removing a block starts a new model."""
 
-    def __init__(self, mujoco: ModuleType, physics: Physics) -> None:
-        self._mujoco, self._physics = mujoco, physics
+    name = "mujoco"
+
+    def __init__(self, physics: Physics) -> None:
+        super().__init__(physics)
+        self._mujoco = _loaded()
         self._bodies: dict[int, _Body] = {}
         self._model: Any = None
         self._data: Any = None
 
-    def add(self, number: int, block_type: BlockType, pose: Pose) -> None:
+    def _add(self, order: int, block_type: BlockType, pose: Pose) -> None:
         self._interrupt()
         place = np.concatenate([pose.position_m, np.roll(pose.quat_xyzw, 1)])
-        self._bodies[number] = _Body(block_type, place, np.zeros(6))
+        self._bodies[order] = _Body(block_type, place, np.zeros(6))
 
-    def remove(self, number: int) -> None:
+    def _remove(self, order: int) -> None:
         self._interrupt()
-        del self._bodies[number]
+        del self._bodies[order]
 
-    def step(self, n: int) -> None:
+    def _step(self, n: int) -> None:
         if n < 1:
             return
         self._begin()
@@ -101,12 +91,14 @@ class _Simulation:
         if any(warning.number for warning in self._data.warning):
             raise SimulationError("MuJoCo found no way on: forces or contacts beyond all bounds")
 
-    def pose(self, number: int) -> Pose:
-        place = self._bodies[number].place
+    def pose(self, order: int) -> Pose:
+        """Return the current pose of a block."""
+        place = self._bodies[order].place
         return Pose(place[:3].copy(), np.roll(place[3:], -1))
 
-    def velocity(self, number: int) -> Velocity:
-        body = self._bodies[number]
+    def velocity(self, order: int) -> Velocity:
+        """Return the current velocity of a block."""
+        body = self._bodies[order]
         spin = body.rotation @ body.motion[3:]
         linear = body.motion[:3] + np.cross(spin, body.center_m)
         return Velocity(_vector(linear), _vector(spin))
@@ -122,7 +114,7 @@ class _Simulation:
         if self._data is not None:
             return
         types = tuple(body.type for body in self._bodies.values())
-        self._model = _model(types, self._physics)
+        self._model = _model(types, self.physics)
         self._data = self._mujoco.MjData(self._model)
         places, motions = self._data.qpos.reshape(-1, 7), self._data.qvel.reshape(-1, 6)
         for place, motion, body in zip(places, motions, self._bodies.values(), strict=True):

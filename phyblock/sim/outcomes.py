@@ -15,7 +15,7 @@ from phyblock.domain.blocks import SHAPES
 from phyblock.domain.scene import Block
 from phyblock.sim.balance import FRICTIONS, MASS_FACTORS
 from phyblock.sim.dynamics import groups, moments, wait
-from phyblock.sim.engine import GRAVITY_M_S2, Physics, Pose, World
+from phyblock.sim.engine import GRAVITY_M_S2, Physics, Pose, open_world
 
 LEAN_DEG = 2.0
 """Slope of the floor [degrees]; at the least friction, blocks begin to slide at 15."""
@@ -63,7 +63,7 @@ def after_removal(blocks: Sequence[Block], order: int) -> Outcome:
     agreed: dict[int, bool | None] = {}
     first: dict[int, Pose] = {}
     for setting in OUTCOME_SETTINGS:
-        with World(setting) as world:
+        with open_world(setting) as world:
             world.place(*left)
             is_at_rest, poses = wait(world, _LONGEST_S), world.poses()
         moved = _moved(left, poses)
@@ -86,7 +86,7 @@ def holds(blocks: Sequence[Block], about: int) -> bool | None:
 
 
 def _holds(blocks: Sequence[Block], setting: Physics) -> bool | None:
-    with World(setting) as world:
+    with open_world(setting) as world:
         world.place(*blocks)
         for is_at_rest in moments(world, _LONGEST_S):
             moved = _moved(blocks, world.poses()).values()

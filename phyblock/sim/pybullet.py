@@ -7,43 +7,23 @@ root of the pair's friction on each body, because Bullet multiplies them.
 
 from __future__ import annotations
 
-import contextlib
 import functools
 import math
 import os
 import tempfile
-from collections.abc import Iterator
 from pathlib import Path
 from types import ModuleType
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from phyblock.domain.blocks import SHAPES, BlockType, quat_xyzw_to_matrix
 from phyblock.errors import SimulationError
-from phyblock.sim.engine import Physics, Pose, Velocity
+from phyblock.sim.engine import Physics, Pose, Velocity, World
 from phyblock.sim.geometry import collision_pieces, principal_inertia_m2, rounded, turned
 
 _MESH_MARGIN_M = 0.001
-
-
-class BulletEngine:
-    """Opens simulations, each in its own PyBullet client."""
-
-    name = "pybullet"
-
-    @contextlib.contextmanager
-    def open(self, physics: Physics) -> Iterator[_Simulation]:
-        """Open a floor without blocks. Raises SimulationError if too many are open."""
-        bullet = _loaded()
-        client = bullet.connect(bullet.DIRECT)
-        if client < 0:
-            raise SimulationError("PyBullet gave no client: too many are open in this process")
-        try:
-            yield _Simulation(bullet, client, physics)
-        finally:
-            bullet.disconnect(client)
 
 
 @functools.cache
@@ -61,72 +41,78 @@ def _loaded() -> ModuleType:
     return cast(ModuleType, pybullet)
 
 
-class _Simulation:
-    """Blocks on a plane, as `Simulation`; Bullet itself uses only centers of mass."""
+class BulletWorld(World):
+    """Blocks on a plane, in a client of its own; Bullet itself uses only centers of mass."""
 
-    def __init__(self, bullet: ModuleType, client: int, physics: Physics) -> None:
-        self._bullet, self._client, self._physics = bullet, client, physics
+    name = "pybullet"
+
+    def __init__(self, physics: Physics) -> None:
+        super().__init__(physics)
+        self._bullet = bullet = _loaded()
+        self._client = bullet.connect(bullet.DIRECT)
+        if self._client < 0:
+            raise SimulationError("PyBullet gave no client: too many are open in this process")
         self._shapes: dict[BlockType, int] = {}
         self._bodies: dict[int, tuple[int, NDArray[np.float64]]] = {}
         """Number of each block in the client, and its center of mass in its own frame [m]."""
-        bullet.setGravity(*physics.gravity_m_s2, physicsClientId=client)
-        bullet.setPhysicsEngineParameter(
+        self._call("setGravity", *physics.gravity_m_s2)
+        self._call(
+            "setPhysicsEngineParameter",
             fixedTimeStep=physics.time_step_s,
             numSolverIterations=physics.iterations,
             deterministicOverlappingPairs=1,
-            physicsClientId=client,
         )
-        plane = bullet.createCollisionShape(bullet.GEOM_PLANE, physicsClientId=client)
-        self._set_friction(bullet.createMultiBody(0, plane, physicsClientId=client))
+        plane = self._call("createCollisionShape", bullet.GEOM_PLANE)
+        self._set_friction(self._call("createMultiBody", 0, plane))
 
-    def add(self, number: int, block_type: BlockType, pose: Pose) -> None:
+    def _call(self, name: str, *args: object, **more: object) -> Any:
+        """Call a function of PyBullet for this client."""
+        return getattr(self._bullet, name)(*args, physicsClientId=self._client, **more)
+
+    def _add(self, order: int, block_type: BlockType, pose: Pose) -> None:
         if block_type not in self._shapes:
             self._shapes[block_type] = self._shape(block_type)
-        mass_kg = self._physics.mass_kg(block_type)
-        body = self._bullet.createMultiBody(
-            baseMass=mass_kg,
-            baseCollisionShapeIndex=self._shapes[block_type],
-            physicsClientId=self._client,
-        )
+        mass_kg = self.physics.mass_kg(block_type)
+        body = int(self._call("createMultiBody", mass_kg, self._shapes[block_type]))
         inertia = [mass_kg * of_axis for of_axis in principal_inertia_m2(block_type)]
-        self._bullet.changeDynamics(
-            body, -1, localInertiaDiagonal=inertia, physicsClientId=self._client
-        )
+        self._call("changeDynamics", body, -1, localInertiaDiagonal=inertia)
         self._set_friction(body)
         offset_m = np.array(SHAPES[block_type].center_of_mass_m)
         offset_here_m = turned(offset_m, quat_xyzw_to_matrix(pose.quat_xyzw))
-        center_m = rounded(pose.position_m + offset_here_m)
-        self._bullet.resetBasePositionAndOrientation(
-            body, center_m.tolist(), pose.quat_xyzw.tolist(), physicsClientId=self._client
-        )
-        self._bodies[number] = (int(body), offset_m)
+        place = rounded(pose.position_m + offset_here_m).tolist(), pose.quat_xyzw.tolist()
+        self._call("resetBasePositionAndOrientation", body, *place)
+        self._bodies[order] = (body, offset_m)
 
-    def remove(self, number: int) -> None:
-        self._bullet.removeBody(self._bodies.pop(number)[0], physicsClientId=self._client)
+    def _remove(self, order: int) -> None:
+        self._call("removeBody", self._bodies.pop(order)[0])
 
-    def step(self, n: int) -> None:
+    def _step(self, n: int) -> None:
+        step, client = self._bullet.stepSimulation, self._client
         for _ in range(n):
-            self._bullet.stepSimulation(physicsClientId=self._client)
+            step(physicsClientId=client)
 
-    def pose(self, number: int) -> Pose:
-        body, offset_m = self._bodies[number]
-        found = self._bullet.getBasePositionAndOrientation(body, physicsClientId=self._client)
-        center_m, quat_xyzw = map(np.array, found)
+    def _close(self) -> None:
+        self._bullet.disconnect(self._client)
+
+    def pose(self, order: int) -> Pose:
+        """Return the current pose of a block."""
+        body, offset_m = self._bodies[order]
+        center_m, quat_xyzw = map(np.array, self._call("getBasePositionAndOrientation", body))
         return Pose(center_m - quat_xyzw_to_matrix(quat_xyzw) @ offset_m, quat_xyzw)
 
-    def velocity(self, number: int) -> Velocity:
-        body, _ = self._bodies[number]
-        return Velocity(*self._bullet.getBaseVelocity(body, physicsClientId=self._client))
+    def velocity(self, order: int) -> Velocity:
+        """Return the current velocity of a block."""
+        return Velocity(*self._call("getBaseVelocity", self._bodies[order][0]))
 
     def _set_friction(self, body: int) -> None:
-        self._bullet.changeDynamics(
+        self._call(
+            "changeDynamics",
             body,
             -1,
-            lateralFriction=math.sqrt(self._physics.friction),
+            lateralFriction=math.sqrt(self.physics.friction),
             rollingFriction=0.0,
             spinningFriction=0.0,
             restitution=0.0,
-            physicsClientId=self._client,
         )
 
     def _shape(self, block_type: BlockType) -> int:
@@ -134,10 +120,8 @@ class _Simulation:
         if SHAPES[block_type].is_box:
             # Bullet keeps its margin inside a box.
             half_m = list(SHAPES[block_type].high_m)
-            shape = self._bullet.createCollisionShape(
-                self._bullet.GEOM_BOX, halfExtents=half_m, physicsClientId=self._client
-            )
-            return int(shape)
+            kind = self._bullet.GEOM_BOX
+            return int(self._call("createCollisionShape", kind, halfExtents=half_m))
         # PyBullet accepts only one hull from memory, but several from a file.
         center = np.array(SHAPES[block_type].center_of_mass_m)
         lines: list[str] = []
@@ -152,9 +136,8 @@ class _Simulation:
         with tempfile.TemporaryDirectory(prefix="phyblock-") as folder:
             path = Path(folder, f"{block_type}.obj")
             path.write_text("\n".join(lines) + "\n", encoding="ascii")
-            shape = self._bullet.createCollisionShape(
-                self._bullet.GEOM_MESH, fileName=str(path), physicsClientId=self._client
-            )
+            kind = self._bullet.GEOM_MESH
+            shape = self._call("createCollisionShape", kind, fileName=str(path))
         if shape < 0:
             raise SimulationError(f"PyBullet refused the collision shape of {block_type}")
         return int(shape)

@@ -13,7 +13,6 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 
 from phyblock.config.validation import PictureControls, TemplateName
-from phyblock.domain.blocks import BlockType
 from phyblock.domain.scene import AssemblyTask, Block, Plan, PoseStep, Scene
 from phyblock.files import bundled
 from phyblock.parsing.poses import (
@@ -29,8 +28,6 @@ from phyblock.scoring.plan import AssemblyScorer
 from phyblock.scoring.pose import (
     POSE_ERRORS,
     POSE_FRAMES,
-    Laid,
-    Piece,
     PoseError,
     PoseScorer,
     blocks_reached,
@@ -41,7 +38,7 @@ from phyblock.sim.balance import is_balanced, surely_stands
 from phyblock.sim.contact import voxel_iou
 from phyblock.sim.dynamics import ExecutionLimits, execute, execution_physics, groups
 from phyblock.sim.engine import Pose, described_engine
-from phyblock.sim.geometry import box_height_cm, center_cm, collision_pieces, origin_m, put
+from phyblock.sim.geometry import box_height_cm, center_cm, origin_m, put
 from phyblock.sim.pictures import goal_style
 from phyblock.sim.ruled import kit_key, kit_png, ruled_key, ruled_png, written_style
 from phyblock.text import plain_sum
@@ -196,12 +193,6 @@ Ended = tuple[Sequence[Mapping[str, Any]], Mapping[str, Any]]
 """Endings of the steps of an executed plan, and the final world, as in records."""
 
 
-@functools.cache
-def pieces_of(block_type: BlockType) -> tuple[Piece, ...]:
-    """Return the convex pieces of a block in its body frame."""
-    return tuple(Piece(p.vertices_m, p.face_normals) for p in collision_pieces(block_type))
-
-
 _scorer = functools.lru_cache(maxsize=32)(PoseScorer)
 
 
@@ -216,18 +207,12 @@ def judge_poses(
 
     If an `earlier` record holds the same plan and tolerances, its result is used.
     """
-    n, scorer = len(item.candidates), _scorer(item.scene, item.candidates, pieces_of)
+    n, scorer = len(item.candidates), _scorer(item.scene, item.candidates)
     parsed = ParsedPoses((), None) if text is None else parse_poses(text, n)
     given, numbers = parsed.steps, [step.candidate for step in parsed.steps]
     blocks = [put(step, item.candidates) for step in given]
-    laid = [
-        Laid(number, block.position_m, block.euler_deg)
-        for number, block in zip(numbers, blocks, strict=True)
-        if block is not None
-    ]
-    poses = scorer.score(laid)
-    found = iter(poses[0].fits)
-    fits = [None if block is None else next(found) for block in blocks]
+    poses = scorer.score(numbers, blocks)
+    fits = poses[0].fits
     ended, whole = _ended_before(earlier, given) or _executed(item.scene, blocks)
     errors = pose_errors(scorer.goal, numbers, fits, [step["end"] for step in ended])
     # The plan without its poses, under every setting and matcher.

@@ -12,18 +12,16 @@ from scipy.spatial.transform import Rotation
 
 from phyblock.domain.blocks import BLOCK_TYPES, SHAPES, euler_deg_to_matrix, symmetries, turn_deg
 from phyblock.domain.scene import Block, Candidate, CandidateSet, Plan, Scene
+from phyblock.domain.symmetry import angles_deg
 from phyblock.scoring.plan import Goal, most_placed
-from phyblock.scoring.pose import Laid, Piece, PoseScorer, overlap_volume, placed
+from phyblock.scoring.pose import PoseScorer, overlap_volume
 from phyblock.scoring.pose_matching import Motion, Nearness, cheapest, matched
+from phyblock.sim.contact import pieces_of
 from phyblock.sim.engine import quat_xyzw_to_euler_deg
-from phyblock.sim.geometry import collision_pieces
 from tests.scoring.cases import cases
+from tests.sim.structures import block
 
 KINDS = ("cube", "cuboid2", "triangle", "arch")
-
-
-def pieces(block_type):
-    return tuple(Piece(p.vertices_m, p.face_normals) for p in collision_pieces(block_type))
 
 
 @st.composite
@@ -45,13 +43,14 @@ def scenes(draw):
     return Scene("s", (2,), tuple(blocks), ("s",)), CandidateSet(tuple(candidates))
 
 
-def laid(scene, candidates, order):
-    found = []
-    for vertex in order:
-        block = scene.blocks[vertex]
-        number = candidates.index_of(block.look)
-        found.append(Laid(number, block.position_m, block.euler_deg))
-    return found
+def scored(scene, candidates, steps, named=None):
+    """Score blocks as steps that name the candidates which look so, or like those of `named`."""
+    numbers = [candidates.index_of(step.look) for step in named or steps]
+    return PoseScorer(scene, candidates).score(numbers, steps)
+
+
+def laid(scene, order):
+    return [scene.blocks[vertex] for vertex in order]
 
 
 def noisy(steps, rng, sigma_m):
@@ -81,7 +80,7 @@ def summary(score):
 def test_a_valid_order_at_true_poses_is_wholly_right(drawn, seed):
     scene, candidates = drawn
     order = scene.graph.random_order(np.random.default_rng(seed))
-    for score in PoseScorer(scene, candidates, pieces).score(laid(scene, candidates, list(order))):
+    for score in scored(scene, candidates, laid(scene, order)):
         assert score.right == (len(scene),) * 4
         assert all(fit is not None and fit.iou in (1, None) for fit in score.fits)
 
@@ -93,10 +92,11 @@ def test_no_more_steps_are_right_than_without_poses_and_wider_tolerances_lose_no
 ):
     scene, candidates = drawn
     vertices = data.draw(st.lists(st.integers(0, len(scene) - 1), max_size=7))
-    steps = noisy(laid(scene, candidates, vertices), np.random.default_rng(seed), sigma_m)
+    steps = noisy(laid(scene, vertices), np.random.default_rng(seed), sigma_m)
     goal = Goal(scene, candidates, "A")
-    most = most_placed(goal, Plan(tuple(step.candidate for step in steps)))
-    for score in PoseScorer(scene, candidates, pieces).score(steps):
+    numbers = tuple(candidates.index_of(step.look) for step in steps)
+    most = most_placed(goal, Plan(numbers))
+    for score in scored(scene, candidates, steps):
         assert sum(fit is not None for fit in score.fits) == most
         assert list(score.right) == sorted(score.right)
         assert score.right[-1] <= most
@@ -116,11 +116,10 @@ def test_aligned_does_not_change_when_the_whole_plan_is_shifted_and_turned(
     """Meters away none stands where it should: what is aligned there is what was sought."""
     scene, candidates = drawn
     rng = np.random.default_rng(seed)
-    steps = noisy(laid(scene, candidates, list(scene.graph.random_order(rng))), rng, sigma_m)
-    scorer = PoseScorer(scene, candidates, pieces)
+    steps = noisy(laid(scene, list(scene.graph.random_order(rng))), rng, sigma_m)
     away = [turned(step, 0.0, (5.0, 0.0)) for step in steps]
     moved = [turned(step, angle_deg, shift_m) for step in away]
-    here, one, other = (scorer.score(plan)[1] for plan in (steps, away, moved))
+    here, one, other = (scored(scene, candidates, plan)[1] for plan in (steps, away, moved))
     assert one.right == other.right
     assert sum(here.right) >= sum(one.right)
     if sigma_m == 0:
@@ -134,10 +133,8 @@ def test_the_best_motion_of_a_plan_is_no_worse_than_none(drawn, random, sigma_m)
     """Also where steps come in an order that is not valid, or some are anywhere."""
     scene, candidates = drawn
     order = random.choices(range(len(scene)), k=random.randint(1, len(scene)))
-    steps = noisy(
-        laid(scene, candidates, order), np.random.default_rng(random.getrandbits(32)), sigma_m
-    )
-    absolute, aligned = PoseScorer(scene, candidates, pieces).score(steps)
+    steps = noisy(laid(scene, order), np.random.default_rng(random.getrandbits(32)), sigma_m)
+    absolute, aligned = scored(scene, candidates, steps)
     assert sum(aligned.right) >= sum(absolute.right)
     if aligned.motion == Motion():
         assert aligned.right == absolute.right
@@ -160,18 +157,18 @@ HALF_TURN = (
 def test_symmetries_and_the_order_of_equal_blocks_in_the_file_change_nothing(drawn, seed):
     scene, candidates = drawn
     rng = np.random.default_rng(seed)
-    steps = noisy(laid(scene, candidates, list(scene.graph.random_order(rng))), rng, 0.012)
+    steps = noisy(laid(scene, list(scene.graph.random_order(rng))), rng, 0.012)
     other = []
     for step in steps:
-        alike = symmetries(candidates[step.candidate].type)
+        alike = symmetries(step.type)
         turn = euler_deg_to_matrix(step.euler_deg) @ alike[int(rng.integers(len(alike)))]
         other.append(
             replace(step, euler_deg=quat_xyzw_to_euler_deg(Rotation.from_matrix(turn).as_quat()))
         )
-    one = PoseScorer(scene, candidates, pieces).score(steps)
+    one = scored(scene, candidates, steps)
     for order in (rng.permutation(len(scene)), range(len(scene))[::-1]):
         shuffled = replace(scene, blocks=tuple(scene.blocks[vertex] for vertex in order))
-        two = PoseScorer(shuffled, candidates, pieces).score(other)
+        two = scored(shuffled, candidates, other, steps)
         assert [summary(score) for score in one] == [summary(score) for score in two]
 
 
@@ -215,9 +212,9 @@ def valid(graph, way):
 
 @pytest.mark.parametrize("block_type", BLOCK_TYPES)
 def test_pieces_fill_their_block_and_its_symmetries_map_it_onto_itself(block_type):
-    solid = pieces(block_type)
+    one = block(1, block_type, FLAT)
     for rotation in symmetries(block_type)[:6]:
-        shared = overlap_volume(solid, placed(solid, rotation, np.zeros(3)))
+        shared = overlap_volume(one, replace(one, euler_deg=angles_deg(rotation)))
         assert shared == pytest.approx(SHAPES[block_type].volume_m3)
         assert turn_deg(block_type, rotation, np.eye(3)) == pytest.approx(0, abs=1e-4)
 
@@ -226,10 +223,9 @@ def test_pieces_fill_their_block_and_its_symmetries_map_it_onto_itself(block_typ
 @given(st.sampled_from(BLOCK_TYPES), st.sampled_from(BLOCK_TYPES), st.integers(0, 999))
 def test_shared_volumes_agree_with_points_drawn_at_random(one, other, seed):
     rng = np.random.default_rng(seed)
-    turn = euler_deg_to_matrix(tuple(rng.uniform(-180, 180, 3)))
-    first, second = pieces(one), placed(pieces(other), turn, rng.uniform(-0.03, 0.03, 3))
-    shape = SHAPES[one]
-    low, high = np.array(shape.low_m), np.array(shape.high_m)
+    turn, place = rng.uniform(-180, 180, 3), rng.uniform(-0.03, 0.03, 3)
+    first, second = block(1, one, FLAT), block(2, other, tuple(place), tuple(turn))
+    low, high = np.array(SHAPES[one].low_m), np.array(SHAPES[one].high_m)
     points = rng.uniform(low, high, (20_000, 3))
     both = _inside(points, first) & _inside(points, second)
     drawn = both.mean() * float(np.prod(high - low))
@@ -240,7 +236,8 @@ def test_shared_volumes_agree_with_points_drawn_at_random(one, other, seed):
 
 def _inside(points, solid):
     found = np.zeros(len(points), dtype=bool)
-    for piece in solid:
-        heights, spans = points @ piece.normals.T, piece.corners @ piece.normals.T
+    for piece in pieces_of(solid):
+        spans = piece.vertices_m @ piece.face_normals.T
+        heights = points @ piece.face_normals.T
         found |= ((heights >= spans.min(axis=0)) & (heights <= spans.max(axis=0))).all(axis=1)
     return found

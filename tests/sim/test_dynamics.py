@@ -22,7 +22,7 @@ from phyblock.sim.dynamics import (
     check_steps,
     settle,
 )
-from phyblock.sim.engine import Physics, Pose, World
+from phyblock.sim.engine import Physics, Pose, open_world
 from phyblock.sim.outcomes import after_removal, holds
 from tests.shipped import TASKS, official_tasks
 from tests.sim.structures import block, built, tower
@@ -45,7 +45,7 @@ SEESAW = (
 def test_a_block_stays_where_it_is_laid_down(block_type, pose):
     lifted = block(1, block_type, (0.0, 0.0, 0.5), POSES[block_type][pose])
     down = replace(lifted, position_m=(0.0, 0.0, 0.5 - drop_height_m(lifted, [])))
-    with World() as world:
+    with open_world() as world:
         world.place(down)
         world.step(0.5)
         assert world.pose(1).distance_m(Pose.goal(down)) < 0.001
@@ -125,7 +125,7 @@ def test_no_verdict_depends_on_a_place(x_m, y_m):
 def test_the_same_falls_whatever_was_tried_before(trial):
     def settled(blocks, *, in_new_worlds):
         forgotten = (dynamics._settled, dynamics._stays)
-        for cached in (*forgotten, dynamics._open_world) if in_new_worlds else forgotten:
+        for cached in (*forgotten, dynamics._kept_world) if in_new_worlds else forgotten:
             cached.cache_clear()
         return settle(blocks, trial)
 

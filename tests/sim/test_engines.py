@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from phyblock.domain.blocks import SHAPES, euler_deg_to_matrix
+from phyblock.domain.blocks import SHAPES
 from phyblock.errors import InputError
-from phyblock.scoring.pose import blocks_reached, overlap_volume, placed
+from phyblock.scoring.pose import blocks_reached, overlap_volume
 from phyblock.sim.contact import voxel_iou
 from phyblock.sim.dynamics import ExecutionLimits, execute
 from phyblock.sim.engine import (
@@ -22,7 +22,6 @@ from phyblock.sim.engine import (
     installed_engines,
     physics_engine,
 )
-from phyblock.tracks.pose_planning import pieces_of
 from tests.sim.structures import block, block_types, counterweighted_beam, eulers, tower
 
 PHYSICS = Physics()
@@ -41,39 +40,27 @@ def engine(request):
     return chosen(request.param)
 
 
-@pytest.fixture
-def simulation(engine):
-    with engine.open(PHYSICS) as opened:
-        yield opened
-
-
-def add_all(simulation, blocks):
-    for one in blocks:
-        simulation.add(one.order, one.type, Pose.goal(one))
-
-
-def bits(simulation, blocks):
+def places(world):
     """Return places and motions of blocks, to the last bit."""
     rows = []
-    for one in blocks:
-        pose, velocity = simulation.pose(one.order), simulation.velocity(one.order)
-        rows += [pose.position_m, pose.quat_xyzw, *map(np.array, velocity)]
+    for order, pose in world.poses().items():
+        rows += [pose.position_m, pose.quat_xyzw, *map(np.array, world.velocity(order))]
     return np.concatenate(rows).tobytes().hex()
 
 
 def fall(engine, blocks, steps):
-    with engine.open(PHYSICS) as opened:
-        add_all(opened, blocks)
-        opened.step(steps)
-        return bits(opened, blocks)
+    with engine(PHYSICS) as world:
+        world.place(*blocks)
+        world.step(steps * PHYSICS.time_step_s)
+        return places(world)
 
 
 @given(block_types, heights, eulers)
 @settings(max_examples=20)
 def test_a_block_is_where_it_was_put_and_at_rest(engine, block_type, height_m, euler_deg):
     one = block(3, block_type, (0.3, -0.2, height_m), euler_deg)
-    with engine.open(PHYSICS) as opened:
-        add_all(opened, [one])
+    with engine(PHYSICS) as opened:
+        opened.place(one)
         assert opened.pose(3).distance_m(Pose.goal(one)) < 1e-9
         assert opened.pose(3).angle_deg(Pose.goal(one)) < 1e-3
         assert_allclose(opened.velocity(3), 0.0)
@@ -82,11 +69,11 @@ def test_a_block_is_where_it_was_put_and_at_rest(engine, block_type, height_m, e
 def test_the_same_calls_give_the_same_bits_beside_others(engine):
     falling = counterweighted_beam()[:3]
     alone = fall(engine, falling, 40)
-    with engine.open(Physics(1 / 300, 80, 0.1)) as other:
-        add_all(other, tower(3))
-        other.step(5)
+    with engine(Physics(1 / 300, 80, 0.1)) as other:
+        other.place(*tower(3))
+        other.step(5 / 300)
         assert fall(engine, falling, 40) == alone
-        other.step(5)
+        other.step(5 / 300)
     assert fall(engine, falling, 40) == alone
 
 
@@ -94,9 +81,9 @@ def test_a_block_in_the_air_falls_the_way_of_gravity(engine):
     downhill = (0.6, 0.0, -0.8)
     x, y, z = (GRAVITY_M_S2 * part for part in downhill)
     one, duration_s = block(1, "triangle", (0.0, 0.0, 3.0)), 0.25
-    with engine.open(Physics(1 / 2000, gravity_m_s2=(x, y, z))) as opened:
-        add_all(opened, [one])
-        opened.step(500)
+    with engine(Physics(1 / 2000, gravity_m_s2=(x, y, z))) as opened:
+        opened.place(one)
+        opened.step(duration_s)
         way = opened.pose(1).position_m - np.array(one.position_m)
         speed = opened.velocity(1).linear_m_s
     assert_allclose(
@@ -110,9 +97,9 @@ def test_friction_holds_a_block_on_a_floor_that_leans(engine, friction, slides):
     """By 31 degrees: a coefficient over 0.6 holds."""
     x, z = (GRAVITY_M_S2 * part for part in (0.6 * 0.857, -0.857))
     one = block(1, "cuboid2", (0.0, 0.0, 0.0125))
-    with engine.open(Physics(friction=friction, gravity_m_s2=(x, 0.0, z))) as opened:
-        add_all(opened, [one])
-        opened.step(60)
+    with engine(Physics(friction=friction, gravity_m_s2=(x, 0.0, z))) as opened:
+        opened.place(one)
+        opened.step(60 / 240)
         assert (opened.pose(1).distance_m(Pose.goal(one)) > 0.02) == slides
 
 
@@ -122,9 +109,9 @@ def test_masses_decide_on_a_beam(engine):
     beam[2] = replace(beam[2], type="cylinder", position_m=(0.0, 0.07, 0.125))
     beam[3] = replace(beam[3], type="cuboid1", position_m=(0.0, -0.05, 0.0875))
     for factor, falls in ((0.3, True), (2.0, False)):
-        with engine.open(Physics(mass_factors=(("cuboid1", factor),))) as opened:
-            add_all(opened, beam)
-            opened.step(240)
+        with engine(Physics(mass_factors=(("cuboid1", factor),))) as opened:
+            opened.place(*beam)
+            opened.step(1)
             assert (opened.pose(2).angle_deg(Pose.goal(beam[1])) > 5) == falls
 
 
@@ -204,11 +191,7 @@ def test_voxels_know_what_two_blocks_share_nearly(kind, way_m, turn_deg):
     x, y, z = one.position_m
     dx, dy, dz = way_m
     other = replace(one, position_m=(x + dx, y + dy, z + dz), euler_deg=(0.0, 0.0, turn_deg))
-    pieces = [
-        placed(pieces_of(kind), euler_deg_to_matrix(b.euler_deg), np.array(b.position_m))
-        for b in (one, other)
-    ]
-    shared = overlap_volume(*pieces)
+    shared = overlap_volume(one, other)
     iou = shared / (2 * SHAPES[kind].volume_m3 - shared)
     assert voxel_iou([one], [other]) == pytest.approx(iou, abs=0.08)
     assert voxel_iou([one], [one]) == 1
