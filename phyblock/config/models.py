@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import ipaddress
 import json
 import os
@@ -22,17 +23,15 @@ from phyblock.config.validation import (
     Flag,
     ModelName,
     Section,
-    Temperature,
     Text,
     TimeoutS,
-    TopP,
     Unique,
     checked,
     fault,
     form,
     read_section,
 )
-from phyblock.config.yaml import expand, read_yaml
+from phyblock.config.yaml import read_yaml
 from phyblock.errors import Problem, SpecError
 from phyblock.registry import baseline_names
 from phyblock.text import did_you_mean
@@ -70,34 +69,27 @@ def is_address(url: str) -> bool:
     Addresses are stored in run folders and the reply cache and shown in messages. So they must not
     contain secrets, and a refused one is not shown.
     """
-    if len(url) > 1000 or not url.isprintable() or set(url) & set("?#\\"):
-        return False
-    if not re.fullmatch(r"(?i)https?://[^\s/@]+(/[!-~]*)?", url):
+    has_form = re.fullmatch(r"(?i)https?://[^\s/@]+(/[!-~]*)?", url)
+    if not has_form or len(url) > 1000 or not url.isprintable() or set(url) & set("?#\\"):
         return False
     try:
         parts = urllib.parse.urlsplit(url)
         host = parts.hostname or ""
         if "[" in parts.netloc:
             ipaddress.IPv6Address(host.partition("%")[0])
-        return (
-            bool(host.encode("idna" if host.isascii() or "[" not in host else "ascii"))
-            and parts.port != 0
-        )
+        else:
+            host.encode("idna")
+        return bool(host) and parts.port != 0
     except ValueError:
         return False
 
 
 def host_of(url: str) -> str:
     """Return only host and port, or "an unreadable address"."""
-    try:
-        parts = urllib.parse.urlsplit(url)
-        host, port = parts.hostname, parts.port
-    except ValueError:
-        host = None
-    if not host:
-        return "an unreadable address"
-    shown = f"[{host}]" if ":" in host else host
-    return shown if port is None else f"{shown}:{port}"
+    with contextlib.suppress(ValueError):
+        if host := urllib.parse.urlsplit(url).netloc.rpartition("@")[2].lower():
+            return host
+    return "an unreadable address"
 
 
 def _one_or_list(value: object) -> object:
@@ -132,12 +124,6 @@ class Tariff(Price):
     under a cost limit they are not sent. null: any."""
 
 
-def _id_faults(model_id: str) -> Iterator[Fault]:
-    if not re.fullmatch(r"[^/ ]+/[^ ]+", model_id):
-        hint = f"such as openai/gpt-4o-2024-08-06; on a server of your own hosted_vllm/{model_id}"
-        yield Fault("is not a litellm id", "provider/model", hint=hint)
-
-
 def _address_faults(url: str) -> Iterator[Fault]:
     if not is_address(url):
         hint = "for example http://localhost:8000/v1; keys go into a variable: api_key_env"
@@ -156,18 +142,21 @@ def _body_faults(body: dict[str, JsonValue]) -> Iterator[Fault]:
 
 _Variable = Annotated[str, form(r"^[A-Za-z_][A-Za-z0-9_]*$", "a name such as MY_KEY")]
 _Group = Annotated[str, form(r"^[a-z0-9][a-z0-9-]{0,39}$", f"up to 40 {HYPHENATED}")]
-_Id = Annotated[str, checked(_id_faults), Field(json_schema_extra={"pattern": r"^[^/ ]+/[^ ]+$"})]
+_ID_ALLOWED = "provider/model: openai/gpt-4o-2024-08-06, hosted_vllm/NAME on your own server"
+_Id = Annotated[str, form(r"^[^/ ]+/[^ ]+$", _ID_ALLOWED)]
 _Address = Annotated[
     str, checked(_address_faults), Field(json_schema_extra={"pattern": "^https?://"})
 ]
+_Temperature = Annotated[float, Field(strict=True, ge=0, le=2)]
+_TopP = Annotated[float, Field(strict=True, gt=0, le=1)]
 
 
 class SamplingSpec(Section):
     """Sampling parameters for models that set none."""
 
-    temperature: Temperature | None = 0.0
+    temperature: _Temperature | None = 0.0
     """0 to 2; null: not sent."""
-    top_p: TopP | None = None
+    top_p: _TopP | None = None
     """Above 0, at most 1; null: not sent."""
     max_tokens: Count | None = 4096
     """Limit of a reply, including thinking [tokens]; null: not sent."""
@@ -215,9 +204,9 @@ class ModelConfig(Section):
     tpm: Count | None = None
     """Maximum tokens per minute, of prompts and replies. A reply counts with its longest possible
     length until it has arrived; a request larger than the limit is sent, and the next one waits."""
-    temperature: Temperature | None = None
+    temperature: _Temperature | None = None
     """0 to 2. If missing: the suite's; null: not sent."""
-    top_p: TopP | None = None
+    top_p: _TopP | None = None
     """Above 0, at most 1. If missing: the suite's; null: not sent."""
     max_tokens: Count | None = None
     """Limit of a reply [tokens]. If missing: the suite's; null: not sent."""
@@ -345,21 +334,20 @@ class ModelConfig(Section):
         address of a custom server. It does record that the server is custom, or the replies of a
         stand-in could pass for the provider's. Fields that are not set are omitted.
         """
-        identity: dict[str, object] = {
+        optional = {
+            "revision": self.revision,
+            "response_format": self.sends_format or None,
+            "image_detail": self.image_detail,
+        }
+        return {
             "kind": self.kind,
             "id": self.id or self.name,
             "api_base": OWN_SERVER if self.addresses else None,
             "params": self.params,
             "sends_seed": self.seed != "never",
             "recording": self.replay,
+            **{name: value for name, value in optional.items() if value is not None},
         }
-        if self.revision is not None:
-            identity["revision"] = self.revision
-        if self.sends_format:
-            identity["response_format"] = True
-        if self.image_detail is not None:
-            identity["image_detail"] = self.image_detail
-        return identity
 
 
 def _entry(value: object) -> object:
@@ -411,13 +399,7 @@ def load_models(path: Path) -> dict[str, ModelConfig]:
     for name, config in models.items():
         update = {"name": name}
         if config.replay is not None:
-            try:
-                update["replay"] = str(expand(config.replay, path.parent))
-            except ValueError as error:
-                where = source.where((name, "replay"))
-                raise SpecError(
-                    Problem(where, str(error), f"{name}.replay", config.replay)
-                ) from error
+            update["replay"] = str(source.file(config.replay, (name, "replay")))
         models[name] = config.model_copy(update=update)
     return models
 

@@ -15,7 +15,7 @@ from itertools import product
 from pathlib import Path, PurePath
 from typing import Annotated, Any, Literal, Self, TypeVar
 
-from pydantic import BaseModel, Field, PrivateAttr, ValidationError, create_model
+from pydantic import BaseModel, Field, PrivateAttr, create_model
 
 from phyblock.config.models import RECORDED, SamplingSpec
 from phyblock.config.validation import (
@@ -34,10 +34,9 @@ from phyblock.config.validation import (
     UniqueSome,
     checked,
     form,
-    problems_of,
     read_section,
 )
-from phyblock.config.yaml import FieldPath, YamlSource, apply_overrides, dotted, expand, read_yaml
+from phyblock.config.yaml import FieldPath, YamlSource, apply_overrides, dotted, read_yaml
 from phyblock.errors import Problem, SpecError
 from phyblock.files import bundled
 from phyblock.registry import baseline_names, known_track, known_tracks
@@ -104,8 +103,7 @@ class DifficultySpec(Section):
     @property
     def ranges(self) -> dict[str, tuple[float, float]]:
         """The ranges that are set."""
-        found = {name: getattr(self, name) for name in type(self).model_fields}
-        return {name: ends for name, ends in found.items() if ends is not None}
+        return self.model_dump(exclude_none=True)
 
 
 class DatasetSpec(Section):
@@ -340,7 +338,7 @@ class Suite(Section):
     """Conditions of presentation that are varied, to measure how much each of them changes a
     model's score."""
 
-    _files: SuiteFiles | None = PrivateAttr(default=None)
+    _files: SuiteFiles = PrivateAttr()
 
     def faults(self) -> Iterator[Fault]:
         """Yield the broken rules between fields."""
@@ -351,9 +349,7 @@ class Suite(Section):
 
     @property
     def files(self) -> SuiteFiles:
-        """The files of the suite. Raises LookupError if it was not read from a file."""
-        if self._files is None:
-            raise LookupError(f"the suite {self.name} was not read from a file")
+        """The files of the suite; only one that was read from a file has them."""
         return self._files
 
     def with_files(self, files: SuiteFiles) -> Self:
@@ -471,12 +467,8 @@ class Suite(Section):
                 message = f"is varied by vary.{factor}, whose first level is the reference"
                 yield Fault(message, str(first), at=path, hint="remove it, or change vary")
         for place, level in enumerate(self.vary.names(factor)):
-            one = self.at(Variant(((factor, level),))).model_dump(exclude={"vary"})
-            try:
-                self.model_validate(one)
-            except ValidationError as error:
-                problem = problems_of(error, type(self), one, "")[0]
-                yield Fault(problem.message, problem.allowed, at=(*at, place), hint=problem.hint)
+            for conflict in self.at(Variant(((factor, level),)))._conflicts():
+                yield conflict._replace(at=(*at, place))
 
 
 def suite_model() -> type[Suite]:
@@ -501,18 +493,18 @@ def load_suite(
     order of the file.
     """
     source = read_yaml(path)
-    problems = apply_overrides(source, overrides)
+    apply_overrides(source, overrides)
     if source.data is None:
-        raise SpecError([*problems, Problem(str(path), "is empty", allowed="a suite")])
+        raise SpecError(Problem(str(path), "is empty", allowed="a suite"))
     # Varied fields have the values of the reference, wherever a single value is needed.
-    suite = read_section(suite_model(), source, problems).at(Variant())
+    suite = read_section(suite_model(), source).at(Variant())
+    problems: list[Problem] = []
 
     def existing(text: str, at: FieldPath, *, is_folder: bool = False) -> Path:
-        base = Path.cwd() if source.place(at).is_override else path.parent
         try:
-            found = expand(text, base)
-        except ValueError as error:
-            problems.append(Problem(source.where(at), str(error), dotted(at), text))
+            found = source.file(text, at)
+        except SpecError as error:
+            problems.extend(error.problems)
             return path
         if not (os.path.isdir if is_folder else os.path.isfile)(found):
             message = f"no such {'folder' if is_folder else 'file'}"

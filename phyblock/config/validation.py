@@ -7,10 +7,10 @@ translates pydantic's errors, for YAML and for lines of JSON.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import islice
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple, Self, TypeVar, get_args
+from typing import Annotated, Any, Literal, NamedTuple, Self, TypeVar, get_args
 
 from pydantic import (
     AfterValidator,
@@ -18,7 +18,6 @@ from pydantic import (
     ConfigDict,
     Field,
     GetCoreSchemaHandler,
-    RootModel,
     ValidationError,
     model_validator,
 )
@@ -139,14 +138,20 @@ class Section(BaseModel):
 
 @dataclass(frozen=True)
 class OneOf:
-    """A check that a value is in a list at validation time, to which plugins may add."""
+    """A check that a value is in a list at validation time, to which plugins may add.
+
+    `kind` is the type of values where the annotation names only the built-in ones.
+    """
 
     choices: Callable[[], Iterable[Any]]
+    kind: type | None = None
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        return core_schema.no_info_after_validator_function(self._check, handler(source))
+        return core_schema.no_info_after_validator_function(
+            self._check, handler(self.kind or source)
+        )
 
     def __get_pydantic_json_schema__(self, *_: object) -> dict[str, Any]:
         return {"enum": [*self.choices()]}
@@ -159,14 +164,9 @@ class OneOf:
         raise fault(Fault(_CHOICE, ", ".join(words), hint=did_you_mean(str(value), words)))
 
 
-if TYPE_CHECKING:
-    ShapeName = BlockType
-    BackgroundName = Background
-    SubtaskName = Subtask
-else:
-    ShapeName = Annotated[str, OneOf(lambda: BLOCK_TYPES)]
-    BackgroundName = Annotated[str, OneOf(lambda: BACKGROUNDS)]
-    SubtaskName = Annotated[str, OneOf(lambda: SUBTASKS)]
+ShapeName = Annotated[BlockType, OneOf(lambda: BLOCK_TYPES, str)]
+BackgroundName = Annotated[Background, OneOf(lambda: BACKGROUNDS, str)]
+SubtaskName = Annotated[Subtask, OneOf(lambda: SUBTASKS, str)]
 
 
 def _repeated(items: tuple[Hashable, ...]) -> Iterator[Fault]:
@@ -184,8 +184,6 @@ UniqueSome = Annotated[tuple[ItemT, ...], Field(min_length=1), checked(_repeated
 """A list with at least one item, whose items all differ."""
 Count = Annotated[int, Field(strict=True, ge=1, le=10**9)]
 Flag = Annotated[bool, Field(strict=True)]
-Temperature = Annotated[float, Field(strict=True, ge=0, le=2)]
-TopP = Annotated[float, Field(strict=True, gt=0, le=1)]
 TimeoutS = Annotated[float, Field(strict=True, gt=0, le=1e9)]
 Cost = Annotated[float, Field(strict=True, ge=0, le=1e9)]
 Text = Annotated[str, Field(min_length=1)]
@@ -204,22 +202,20 @@ class PictureControls(Section):
     """Do not send the picture of the goal; for questions, any picture."""
 
 
-def read_section(model: type[ModelT], source: YamlSource, more: Sequence[Problem] = ()) -> ModelT:
+def read_section(model: type[ModelT], source: YamlSource) -> ModelT:
     """Return a YAML document as its model.
 
-    Raises SpecError with all problems, including `more`, in the order of the file. A text that
-    looks like an API key is a problem and is not shown, so that no key reaches a run folder.
+    Raises SpecError with all problems in the order of the file. A text that looks like an API key
+    is a problem and is not shown, so that no key reaches a run folder.
     """
-    problems = [*more, *secrets(source)]
-    instance = None
+    problems = secrets(source)
+    hidden = {problem.field for problem in problems}
     try:
         instance = model.model_validate(source.data)
     except ValidationError as error:
-        hidden = {problem.field for problem in problems}
-        problems += [
-            one for one in problems_of(error, model, source.data, source) if one.field not in hidden
-        ]
-    if instance is None or problems:
+        found = problems_of(error, model, source.data, source)
+        problems += [one for one in found if one.field not in hidden]
+    if problems:
         raise SpecError(source.in_order(problems))
     return instance
 
@@ -258,12 +254,12 @@ def problems_of(
 def _located(detail: ErrorDetails, data: object) -> tuple[FieldPath, Any]:
     """Return the path of an error in the data, without pydantic's names of union members."""
     path: list[str | int] = []
-    kind, tag = detail["type"], detail.get("ctx", {}).get("discriminator", "")
-    loc = (*detail["loc"], tag.strip("'")) if kind.startswith("union_tag") else detail["loc"]
+    kind, tag = detail["type"], detail.get("ctx", {}).get("discriminator", "").strip("'")
+    loc = (*detail["loc"], tag) if kind.startswith("union_tag") else detail["loc"]
     for n, part in enumerate(loc, 1):
-        may_lack = kind == _FAULT or (kind in ("missing", "union_tag_not_found") and n == len(loc))
-        is_field = isinstance(part, str) and part != "[key]" and may_lack
-        if isinstance(data, Mapping) and (part in data or is_field):
+        is_last = n == len(loc) and kind in ("missing", "union_tag_not_found")
+        may_lack = part != "[key]" and (kind == _FAULT or is_last)
+        if isinstance(data, Mapping) and (part in data or may_lack):
             data = data.get(part)
         elif isinstance(data, list) and isinstance(part, int) and part < len(data):
             data = data[part]
@@ -327,19 +323,16 @@ def _listed(name: str, value: Any) -> str:
 
 def _section(model: type[BaseModel], path: FieldPath) -> type[BaseModel]:
     """Return the model of the value at `path`, or the nearest one around it."""
-    if issubclass(model, RootModel):
-        (((model,),), path) = _parts(model).values(), path[1:]
     for part in path:
-        model = next(iter(_parts(model).get(str(part), ())), model)
+        parts = _parts(model)
+        model = next(iter(parts.get(str(part), parts.get("root", ()))), model)
     return model
 
 
 def _parts(model: type[BaseModel]) -> dict[str, list[type[BaseModel]]]:
     """Return the models in the types of a model's fields, by the names used in files."""
     fields = {field.alias or name: field for name, field in model.model_fields.items()}
-    return {
-        name: _models_in(field.annotation) for name, field in fields.items() if not field.exclude
-    }
+    return {name: _models_in(one.annotation) for name, one in fields.items() if not one.exclude}
 
 
 def _models_in(hint: Any) -> list[type[BaseModel]]:

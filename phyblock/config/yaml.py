@@ -86,23 +86,6 @@ def dotted(path: FieldPath) -> str:
     return text.removeprefix(".")
 
 
-def expand(text: str, base: Path) -> Path:
-    """Return the absolute path of `text`, relative to the folder `base`.
-
-    `~` and $VARIABLES are expanded. Raises ValueError, with a message for the user, if a variable
-    is not set, or a name is not UTF-8.
-    """
-    expanded = os.path.expandvars(os.path.expanduser(text))
-    if unset := re.search(r"\$\{?(\w+)", expanded):
-        raise ValueError(f"the environment variable {unset[1]} is not set")
-    path = Path(os.path.normpath(base.absolute() / expanded))
-    try:
-        str(path).encode()
-    except UnicodeEncodeError:
-        raise ValueError("is in a folder whose name is not UTF-8") from None
-    return path
-
-
 class Place(NamedTuple):
     """The places of a key and of its value in a file, or of the override that set it."""
 
@@ -132,6 +115,24 @@ class YamlSource:
         """Return the place of the value at `path` (or of its key) as text, or the nearest."""
         place = self.place(path)
         return place.key if key else place.value
+
+    def file(self, text: str, path: FieldPath) -> Path:
+        """Return the absolute path that the text at `path` names.
+
+        It is relative to the file's folder, in an override to the working directory; `~` and
+        $VARIABLES are expanded. Raises SpecError if a variable is not set or a name is not UTF-8.
+        """
+        expanded = os.path.expandvars(os.path.expanduser(text))
+        base = Path() if self.place(path).is_override else Path(self.label).parent
+        found = Path(os.path.normpath(base.absolute() / expanded))
+        message = ""
+        if unset := re.search(r"\$\{?(\w+)", expanded):
+            message = f"the environment variable {unset[1]} is not set"
+        elif re.search("[\ud800-\udfff]", str(found)):
+            message = "is in a folder whose name is not UTF-8"
+        if message:
+            raise SpecError(Problem(self.where(path), message, dotted(path), text))
+        return found
 
     def in_order(self, problems: Iterable[Problem]) -> list[Problem]:
         """Return problems in the order of the file, those of the command line last."""
@@ -324,28 +325,25 @@ def secrets(source: YamlSource) -> list[Problem]:
     return list(below(source.data, ()))
 
 
-def apply_overrides(source: YamlSource, overrides: Iterable[str]) -> list[Problem]:
+def apply_overrides(source: YamlSource, overrides: Iterable[str]) -> None:
     """Set each "key=value" in the source's data, as if it were in the file.
 
-    Keys are dotted; values are YAML. A later override of the same key wins. Returns the problems of
-    malformed overrides; keys and values are validated with the rest of the file.
+    Keys are dotted; values are YAML. A later override of the same key wins. Raises SpecError for a
+    malformed override; keys and values are validated with the rest of the file.
     """
-    problems: list[Problem] = []
     for text in overrides:
         where = "--set ..." if looks_secret(text) else f"--set {text}"
-        place = Place(where, where, is_override=True)
         key, equals, raw = text.partition("=")
         path = tuple(part.strip() for part in key.split("."))
         if not (equals and all(path) and len(path) < _DEEPEST):
-            problems.append(Problem(where, "is not of the form key=value", hint=_FORM))
-            continue
+            raise SpecError(Problem(where, "is not of the form key=value", hint=_FORM))
         try:
             value = parse_yaml(raw, where, base=path).data
         except SpecError as error:
-            problems += [replace(one, where=where, hint=QUOTE_HINT) for one in error.problems]
-            continue
+            problems = [replace(one, where=where, hint=QUOTE_HINT) for one in error.problems]
+            raise SpecError(problems) from None
         source.data = {} if source.data is None else source.data
-        here = source.data
+        here, place = source.data, Place(where, where, is_override=True)
         for end, part in enumerate(path[:-1], 1):
             if isinstance(here, dict) and here.get(part) is None:
                 here[part] = {}
@@ -353,10 +351,9 @@ def apply_overrides(source: YamlSource, overrides: Iterable[str]) -> list[Proble
             here = here.get(part) if isinstance(here, dict) else here
         if not isinstance(here, dict):
             message = "cannot be set: it is inside a value that is not a mapping"
-            problems.append(Problem(where, message, dotted(path), shown(here)))
-            continue
+            raise SpecError(Problem(where, message, dotted(path), shown(here)))
         here[path[-1]] = value
-        for below in [one for one in source.places if one[: len(path)] == path]:
-            del source.places[below]
+        below = [one for one in source.places if one[: len(path)] == path]
+        for one in below:
+            del source.places[one]
         source.places[path] = place
-    return problems
