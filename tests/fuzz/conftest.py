@@ -39,13 +39,13 @@ def sound(new_workspace: Callable[..., Workspace]) -> Workspace:
 def ended(sound: Workspace, tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     """The same with a finished run of each track: `out`, `steps` and `asked`."""
     made = sound.copied(tmp_path_factory.mktemp("ended") / "w")
-    steps = ["--set", "tracks=[step_planning]", "--set", "steps.physics=off"]
-    for args in (
-        ["suite.yaml", "--out", "out", "--models", "random,oracle"],
-        ["suite.yaml", "--out", "steps", "--models", "oracle", *steps],
-        ["questions.yaml", "--out", "asked"],
+    steps = ("--set", "tracks=[step_planning]", "--set", "steps.physics=off")
+    for words in (
+        ("suite.yaml", "--out", "out", "--models", "random,oracle"),
+        ("suite.yaml", "--out", "steps", "--models", "oracle", *steps),
+        ("questions.yaml", "--out", "asked"),
     ):
-        made.does("run", *args, "--no-report")
+        made.does("run", *words, "--no-report")
     for name in ("report/ch1/thesis.tex", "figures/mine.svg", "tables/mine.csv", "notes.md"):
         path = made.root / "out" / name
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -14,7 +14,7 @@ import shutil
 import subprocess
 import tempfile
 from collections import Counter
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -276,22 +276,19 @@ class Ledger:
         """Requests that ended so."""
         return {entry.key for entry in self.entries if entry.comes_to == end}
 
-
-def asked_twice(entries: Iterable[Entry], *, retries_refused: bool = False) -> Iterator[Broken]:
-    """Return what was asked again after it was answered, or refused for good."""
-    ended: dict[tuple[str, str], Entry] = {}
-    for entry in entries:
-        if entry.key in ended:
-            yield Broken(3, "asked twice", f"{ended[entry.key]}, then {entry}")
-        if entry.comes_to == "reply" or (entry.comes_to == "sample" and not retries_refused):
-            ended[entry.key] = entry
-
-
-def lost(ledger: Ledger, kept: Collection[tuple[str, str]]) -> Iterator[Broken]:
-    """Return what was answered and is not kept."""
-    for model, sample in sorted(ledger.that_came_to("reply") - set(kept)):
-        endings = [entry.ending for entry in ledger.entries if entry.key == (model, sample)]
-        yield Broken(3, "a reply is lost", f"{sample} of {model}: {endings}")
+    def broken(self, folder: Path, *, retries_refused: bool = False) -> Iterator[Broken]:
+        """Yield what was asked again after it was answered or refused for good, and what was
+        answered and is not in a run.
+        """
+        ended: dict[tuple[str, str], Entry] = {}
+        for entry in self.entries:
+            if entry.key in ended:
+                yield Broken(3, "asked twice", f"{ended[entry.key]}, then {entry}")
+            if entry.comes_to == "reply" or (entry.comes_to == "sample" and not retries_refused):
+                ended[entry.key] = entry
+        for lost in sorted(self.that_came_to("reply") - kept_in(folder)):
+            endings = [entry.ending for entry in self.entries if entry.key == lost]
+            yield Broken(3, "a reply is lost", f"{lost}: {endings}")
 
 
 def kept_in(folder: Path) -> set[tuple[str, str]]:
@@ -299,15 +296,10 @@ def kept_in(folder: Path) -> set[tuple[str, str]]:
 
     A last line that a kill cut short does not count.
     """
-    found = set()
-    for name in _KEPT_FILES:
-        path = folder / name
-        for line in path.read_bytes().split(b"\n")[:-1] if path.exists() else ():
-            stored: dict[str, Any] = json.loads(line)
-            model = stored["model"]
-            if stored.get("reply") is not None:
-                found.add((model, stored["reply"]["reasoning"]))
-    return found
+    paths = (folder / name for name in _KEPT_FILES)
+    lines = [one for p in paths if p.exists() for one in p.read_bytes().split(b"\n")[:-1]]
+    stored = [one for one in map(json.loads, lines) if one.get("reply") is not None]
+    return {(one["model"], one["reply"]["reasoning"]) for one in stored}
 
 
 class LedgerChat(OpenAIChat):

@@ -15,10 +15,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.errors import SampleError
+from phyblock.errors import RetryableError, SampleError
 from phyblock.models.costs import Budget
 from phyblock.records.record import Reply
-from tests.fuzz.laws import LedgerAgent, LedgerChat, Watch, asked_twice, kept_in, lost, run_watched
+from tests.fuzz.laws import LedgerAgent, LedgerChat, Watch, run_watched
 from tests.fuzz.strategies import FAULTS, SEED, fuzzed
 from tests.models.factory import (
     QUICK,
@@ -99,7 +99,7 @@ def one_round(workspace, server, track):
     asked = len(ledger.entries)
     assert run(workspace).code == (1 if ledger.that_came_to("sample") else 0), done.out + done.err
     assert len(ledger.entries) == asked, "a run that was done asked again"
-    holds([*asked_twice(ledger.entries), *lost(ledger, kept_in(workspace.out))])
+    holds(ledger.broken(workspace.out))
 
     server.faults = Faults()
     refused = {entry.key for entry in ledger.entries[first:] if entry.comes_to == "sample"}
@@ -108,7 +108,7 @@ def one_round(workspace, server, track):
     again = ledger.entries[asked:]
     if track != "step_planning":  # where an episode goes on with turns that were never asked
         assert Counter(entry.key for entry in again) == Counter(refused)
-    holds(asked_twice(ledger.entries, retries_refused=True))
+    holds(ledger.broken(workspace.out, retries_refused=True))
 
     asked = len(ledger.entries)
     workspace.out = workspace.out.with_name(f"{workspace.out.name}-again")
@@ -148,48 +148,37 @@ def test_faults_that_stop_a_model(workspace, tallies, transport):
             assert done.code in (0, 1), done.out + done.err
         server.faults = Faults()
         assert run(workspace).code == 0
-    holds([*asked_twice(server.ledger.entries), *lost(server.ledger, kept_in(workspace.out))])
+    holds(server.ledger.broken(workspace.out))
     tallies.setdefault(f"faults that stop, {transport}", Counter()).update(server.ledger.faults)
 
 
 ASKED = 4
 COMMANDS = 25
-
-
-WAYS = {
-    "openai": (OpenAIBatches, "direct"),
-    "anthropic": (AnthropicBatches, "anthropic"),
-    "gemini": (GeminiBatches, "gemini"),
-}
+WAYS = [
+    (OpenAIBatches, "direct"),
+    pytest.param(AnthropicBatches, "anthropic", marks=pytest.mark.slow),
+    pytest.param(GeminiBatches, "gemini", marks=pytest.mark.slow),
+]
 WHOLE = ("ok", "twice", "stranger")
 endings = st.sampled_from([*WHOLE, "500", "429", "400", "length", "missing", "broken", "expired"])
 failures = st.lists(st.sampled_from(["", "500", "reset", "done-reset"]), max_size=3).map(tuple)
-
-
-@st.composite
-def batch_faults(draw):
-    """Faults of four batches, one of which may be cancelled or refused, and calls about them."""
-    lines = st.dictionaries(st.integers(0, ASKED - 1), endings, max_size=ASKED)
-    kinds = ["upload", "create", "look", "results"]
-    ends = st.dictionaries(st.integers(0, 1), st.sampled_from(["refused", "cancelled"]), max_size=1)
-    return BatchFaults(
-        draw(st.dictionaries(st.integers(0, 3), lines)),
-        draw(ends),
-        {kind: draw(failures) for kind in kinds},
-        looks=draw(st.integers(1, 3)),
-    )
+lines = st.dictionaries(st.integers(0, ASKED - 1), endings, max_size=ASKED)
+batch_faults = st.builds(
+    BatchFaults,
+    st.dictionaries(st.integers(0, 3), lines),
+    st.dictionaries(st.integers(0, 1), st.sampled_from(["refused", "cancelled"]), max_size=1),
+    st.fixed_dictionaries(dict.fromkeys(("upload", "create", "look", "results"), failures)),
+    looks=st.integers(1, 3),
+)
+"""Faults of four batches, one of which may be cancelled or refused, and of calls about them."""
 
 
 # What a kill cuts off in litellm is closed when it is collected.
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
-@pytest.mark.parametrize(
-    "way",
-    [name if name == "openai" else pytest.param(name, marks=pytest.mark.slow) for name in WAYS],
-)
+@pytest.mark.parametrize(("kind", "route"), WAYS)
 @fuzzed(15)
-@given(batch_faults(), st.lists(st.integers(0, 25), max_size=3))
-def test_batches(way, faults, kills):
-    kind, route = WAYS[way]
+@given(batch_faults, st.lists(st.integers(0, 25), max_size=3))
+def test_batches(kind, route, faults, kills):
     requests = [make_request(f"{n:03d}") for n in range(ASKED)]
     policy = replace(QUICK, attempts=3)
     with tempfile.TemporaryDirectory() as folder, Running(kind(batch=faults)) as running:
@@ -201,8 +190,12 @@ def test_batches(way, faults, kills):
             disk.moment, server.moment = killing.here, killing.there
             asyncio.run(killing.run(command(config, disk, requests, policy=policy)))
         disk.moment, server.moment = None, lambda *_: None
+        options = {"policy": policy, "budget": Budget(1e9)}
+        failed = []
         for _ in range(COMMANDS):
-            ended = run_command(config, disk, requests, policy=policy, budget=Budget(1e9))
+            ended = run_command(config, disk, requests, recorded=failed, **options)
+            # A run records what failed, and asks it again.
+            failed = [r for r, e in zip(requests, ended, strict=True) if type(e) is RetryableError]
             if all(isinstance(one, (Reply, SampleError)) for one in ended):
                 break
             if unsure := [str(one) for one in ended if "is not known whether" in str(one)]:
@@ -212,14 +205,10 @@ def test_batches(way, faults, kills):
         answered = Counter()
         for made in server.made:
             told = faults.lines.get(made.ordinal, {})
-            if faults.ends.get(made.ordinal) == "refused":
-                continue
-            for place, seen in enumerate(made.seen):
-                answered[seen.sample] += told.get(place, "ok") in (*WHOLE, "length", "400")
+            if faults.ends.get(made.ordinal) != "refused":
+                for place, seen in enumerate(made.seen):
+                    answered[seen.sample] += told.get(place, "ok") in (*WHOLE, "length", "400")
         assert set(answered.values()) == {1}, answered
-
-
-_ROUNDS = -(-FAULTS // 40)
 
 
 class Moody(OpenAIChat):
@@ -237,7 +226,7 @@ class Moody(OpenAIChat):
         return {**super().reply(seen, ending), "usage": usage}
 
 
-@pytest.mark.parametrize("number", range(_ROUNDS))
+@pytest.mark.parametrize("number", range(-(-FAULTS // 40)))
 def test_no_more_is_spent_than_the_limit_and_what_was_under_way(workspace, tallies, number):
     draw = random.Random(f"{SEED} costs {number}")
     limit = 10 ** draw.uniform(-1, 2)
