@@ -60,15 +60,15 @@ BUILTIN_DATASET = "phyblock-400"
 PROMPT_WORDS = ("default", "official")
 REPEAT = "repeats"
 """The factor that changes nothing in requests: its levels repeat them."""
-FACTORS: Mapping[str, tuple[str, ...] | None] = {
-    "prompt": None,
+FACTORS: Mapping[str, tuple[str, ...]] = {
+    "prompt": (),
     "background": ("images", "background"),
     "view": ("images", "view"),
     "candidate_order": ("candidates", "order"),
     "layout": ("images", "layout"),
-    REPEAT: None,
+    REPEAT: (),
 }
-"""Factors of `vary` with the path of the field that each sets; the prompt is in a field of each
+"""Factors of `vary` with the path of the field that each sets; that of the prompt depends on the
 track."""
 
 Prompt = Literal["default", "official"] | Template
@@ -272,11 +272,10 @@ class VarySpec(Section):
 
 
 def _with_value(spec: SectionT, path: tuple[str, ...], value: Any) -> SectionT:
-    """Return a suite or section with another value at a path of fields."""
-    name, *below = path
-    if below:
-        value = _with_value(getattr(spec, name), tuple(below), value)
-    return spec.model_copy(update={name: value})
+    """Return a suite or section with another value at a path of fields; unchanged for none."""
+    for end in range(len(path) - 1, -1, -1):
+        value = functools.reduce(getattr, path[:end], spec).model_copy(update={path[end]: value})
+    return value if path else spec
 
 
 @dataclass(frozen=True)
@@ -363,23 +362,13 @@ class Suite(Section):
         return self.files.source.where(path)
 
     def section(self, model: type[SectionT]) -> SectionT:
-        """Return the section of a track. Raises LookupError if the suite has none."""
-        for name in type(self).model_fields:
-            if isinstance(value := getattr(self, name), model):
-                return value
-        raise LookupError(f"the suite has no section of {model.__name__}")
+        """Return the section of a track, which the suite must have."""
+        return next(value for _, value in self if isinstance(value, model))
 
     def template(self, track: str) -> Path | None:
         """Return the file of a track's prompt, or None if it is bundled."""
         text = functools.reduce(getattr, known_track(track).prompt_field(), self)
         return self.files.templates.get((track, str(text)))
-
-    def fields_of(self, factor: str) -> tuple[tuple[str, ...], ...]:
-        """Return the paths of the fields that a factor sets; none for repeats."""
-        if factor == "prompt":
-            return tuple(known_track(name).prompt_field() for name in self.tracks)
-        path = FACTORS[factor]
-        return () if path is None else (path,)
 
     def at(self, variant: Variant) -> Self:
         """Return the suite of a variant, with other factors at their reference."""
@@ -387,9 +376,12 @@ class Suite(Section):
         levels = {name: self.vary.names(name)[0] for name in self.vary.factors}
         for factor, level in {**levels, **dict(variant.levels)}.items():
             value = self.vary.values(factor)[self.vary.names(factor).index(level)]
-            for path in self.fields_of(factor):
-                suite = _with_value(suite, path, value)
+            suite = _with_value(suite, self._field(factor), value)
         return suite
+
+    def _field(self, factor: str) -> tuple[str, ...]:
+        """Return the path of the field that a factor sets, () for repeats."""
+        return known_track(self.tracks[0]).prompt_field() if factor == "prompt" else FACTORS[factor]
 
     def identity(self) -> dict[str, Any]:
         """Return everything that determines the results as JSON data, whatever the order of lists.
@@ -446,26 +438,24 @@ class Suite(Section):
 
     def _vary_faults(self, factor: str) -> Iterator[Fault]:
         """Yield the faults of a factor: its tracks must support it, and other fields allow it."""
-        at, paths = ("vary", factor), self.fields_of(factor)
+        at, path = ("vary", factor), self._field(factor)
+        message = allowed = hint = ""
         for kind in map(known_track, self.tracks):
             if factor not in kind.varies:
-                message = f"does not apply to {kind.name}"
-                yield Fault(message, ", ".join(kind.varies), at=at, key=True)
-                return
-        if len(paths) > 1:
+                message, allowed = f"does not apply to {kind.name}", ", ".join(kind.varies)
+        if not message and factor == "prompt" and len(self.tracks) > 1:
             message = "is varied in a suite of several tracks, each of which has its own"
-            yield Fault(message, at=at, key=True, hint="run one track at a time")
-            return
-        if factor in ("background", "view") and self.images.source == "dataset":
+            hint = "run one track at a time"
+        elif factor in ("background", "view") and self.images.source == "dataset":
             message = "cannot be varied in the data set's own pictures"
-            yield Fault(message, at=at, key=True, hint="use images.source: render")
+            hint = "use images.source: render"
+        if message:
+            yield Fault(message, allowed, at=at, hint=hint, key=True)
             return
-        first = self.vary.values(factor)[0]
-        for path in paths:
-            section = functools.reduce(getattr, path[:-1], self)
-            if path[-1] in section.model_fields_set and getattr(section, path[-1]) != first:
-                message = f"is varied by vary.{factor}, whose first level is the reference"
-                yield Fault(message, str(first), at=path, hint="remove it, or change vary")
+        first, section = self.vary.values(factor)[0], functools.reduce(getattr, path[:-1], self)
+        if path and path[-1] in section.model_fields_set and getattr(section, path[-1]) != first:
+            message = f"is varied by vary.{factor}, whose first level is the reference"
+            yield Fault(message, str(first), at=path, hint="remove it, or change vary")
         for place, level in enumerate(self.vary.names(factor)):
             for conflict in self.at(Variant(((factor, level),)))._conflicts():
                 yield conflict._replace(at=(*at, place))

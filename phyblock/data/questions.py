@@ -48,7 +48,6 @@ from phyblock.records.record import Line, decode
 from phyblock.types import Background
 
 QUESTIONS_FILE = "questions.jsonl"
-_MOST_OPTIONS = 26
 _MOST_PICTURES = 2 + len(LETTERS)
 
 
@@ -144,14 +143,12 @@ class StoredPicture(Line, extra="forbid"):
 
     def faults(self, scene: Scene) -> Iterator[Fault]:
         """Yield its faults as a picture of a scene."""
-        orders = {str(block.order) for block in scene.blocks}
-        yield from _unknown_orders(self.without, scene, "without")
-        yield from _unknown_orders(self.poses, scene, "poses")
-        yield from _unknown_orders(self.swap, scene, "swap")
-        for block in self.add:
-            if str(block.order) in orders:
-                message = "has the order of a block of the scene"
-                yield Fault(message, found=str(block.order), at=("add",))
+        for field, given in (("without", self.without), ("poses", self.poses), ("swap", self.swap)):
+            yield from _unknown_orders(given, scene, field)
+        taken = {block.order for block in scene.blocks} & {block.order for block in self.add}
+        for order in sorted(taken):
+            message = "has the order of a block of the scene"
+            yield Fault(message, found=str(order), at=("add",))
         if not self.add and len(set(self.without)) == len(scene):
             yield Fault("draws no blocks", found="")
 
@@ -165,23 +162,19 @@ def _unknown_orders(orders: Iterable[object], scene: Scene, field: str) -> Itera
 
 
 def _option_faults(options: Sequence[str]) -> Iterator[Fault]:
-    if len(options) != len(LETTERS):
-        yield Fault("are not four", "four options", str(len(options)))
     # Options must differ in more than letter case and spaces.
     read = [" ".join(option.lower().split()) for option in options]
     for i, option in enumerate(options):
-        first = read.index(read[i])
-        if first != i:
-            message = f"is the same as option {LETTERS[first]}" if first < 4 else "is listed twice"
+        if (first := read.index(read[i])) != i:
+            message = f"is the same as option {LETTERS[first]}"
             yield Fault(message, "four options that differ", shown(option), (i,))
     wanted = [f"<img{i}>" for i in range(1, len(LETTERS) + 1)]
     if any(map(is_picture_option, options)) and list(options) != wanted:
         yield Fault("are not the four pictures", " ".join(wanted))
 
 
-Options = Annotated[
-    tuple[Text, ...], Field(min_length=1, max_length=_MOST_OPTIONS), checked(_option_faults)
-]
+_FOUR = Field(min_length=len(LETTERS), max_length=len(LETTERS))
+Options = Annotated[tuple[Text, ...], _FOUR, checked(_option_faults)]
 """Four different texts, or the four pictures in order."""
 
 

@@ -192,7 +192,7 @@ FAULTS = [
     ("CO.json", "{", ":2: is not JSON"),
     ("CO.json", {"scene_id": 1}, ": has the wrong type"),
     ("CO.json", [3], ": [0]: has the wrong type"),
-    ("CO.json", [{**COLOR, "options": ["red", "blue"]}], ": [0].options: are not four"),
+    ("CO.json", [{**COLOR, "options": ["red", "blue"]}], ": [0].options: has too few items"),
     ("CO.json", [{**COLOR, "answer": 2}], ": [0].answer: has the wrong type"),
     ("CO.json", [COLOR, {**COLOR, "answer": "E"}], "[1]: answer: is none of the options"),
     ("CO.json", [{**COLOR, "answer": "purple"}], "[0]: answer: is none of the options"),

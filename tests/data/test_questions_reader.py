@@ -81,7 +81,7 @@ BROKEN = [
     ("answer", "E", "answer", '"E"'),
     ("answer", "BADC", "answer", '"BADC"'),
     ("options", ["red", "blue", "Red ", "green"], "options[2]", '"Red "'),
-    ("options", ["red", "blue", "green"], "options", "3"),
+    ("options", ["red", "blue", "green"], "options", '["red", "blue", "green"]'),
     ("options", ["<img1>", "<img2>", "<img3>", "<img4>"], "pictures", ALL),
     ("options", [f"place {letter}" for letter in "ABCD"], "pictures", ALL),
     ("subtask", "XX", "subtask", '"XX"'),
