@@ -179,7 +179,7 @@ batch_faults = st.builds(
 @fuzzed(15)
 @given(batch_faults, st.lists(st.integers(0, 25), max_size=3))
 def test_batches(kind, route, faults, kills):
-    requests = [make_request(f"{n:03d}") for n in range(ASKED)]
+    requests = [replace(make_request(f"{n:03d}"), sample=f"s{n}") for n in range(ASKED)]
     policy = replace(QUICK, attempts=3)
     with tempfile.TemporaryDirectory() as folder, Running(kind(batch=faults)) as running:
         server = running.server
