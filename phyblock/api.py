@@ -50,8 +50,7 @@ from phyblock.models.request import Request, wire_messages
 from phyblock.records.record import Record, Reply
 from phyblock.registry import added_measures, known_track, known_tracks
 from phyblock.results.load import Run, load_run
-from phyblock.run.estimate import may_bill
-from phyblock.run.plan import check_models, find_models_file, make_plan, read_suite
+from phyblock.run.plan import check_models, find_models_file, make_plan, may_bill, read_suite
 from phyblock.run.runner import RunEvent, Session, Stopping, completed
 from phyblock.run.store import begun, judge_episode, judge_reply
 from phyblock.sim.pictures import PictureStyle, candidates_png, composite_png, goal_png, goal_style

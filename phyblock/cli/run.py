@@ -46,14 +46,16 @@ from phyblock.errors import Problem, SpecError
 from phyblock.files import OutFolder
 from phyblock.records.files import RECORDS, read_manifest
 from phyblock.results.text import NO_VALUE, REPORT_FILE, TABLES, Column, TextTable
-from phyblock.run.estimate import Estimate, estimate, may_bill
 from phyblock.run.manifest import code_versions
 from phyblock.run.plan import (
+    Estimate,
     RunPlan,
     bundled_suites,
     check_models,
+    estimate,
     find_models_file,
     make_plan,
+    may_bill,
     read_suite,
 )
 from phyblock.run.runner import RunResult, Session, completed

@@ -206,14 +206,14 @@ class Session:
         stack.callback(store.close)
         progress = store.progress
         earlier: dict[str, list[Summary]] = {name: [] for name in self._queues}
-        for name, queue in self._queues.items():
-            for sample in plan.samples(name):
+        for planned in plan.models:
+            for sample in plan.samples(planned):
                 known = progress.samples.get(sample.id)
                 if known and (known.is_answered if self.retry_failed else known.is_final):
-                    earlier[name].append(known)
+                    earlier[planned.name].append(known)
                     result.add(known)
                 else:
-                    queue.append(sample)
+                    self._queues[planned.name].append(sample)
         cache: ReplyCache | None = None
         if self.use_cache and any(model.kind == "litellm" for model in plan.models):
             cache = ReplyCache(reply_cache_file(), partial(self._notice, ""))
@@ -230,10 +230,8 @@ class Session:
             policy=RetryPolicy(limits.max_attempts, limits.retry_for_s),
         )
         for planned in plan.models:
-            if (present := self.present.get(planned.name)) is not None:
-                model: Model = _Journaled(present, planned, store)
-            else:
-                model = build(planned, batches=self._batch_files(planned))
+            present = self.present.get(planned.name)
+            model = present or build(planned, batches=self._batch_files(planned))
             self._models[planned.name] = model
             stack.push_async_callback(model.aclose)
         result.unanswered = progress.unanswered_text
@@ -279,7 +277,7 @@ class Session:
                 most = _LOCAL_AT_ONCE
             # All requests of a batch are asked at once.
             count = len(queue) if planned.batch else min(most, len(queue))
-            workers += [asyncio.create_task(self._work(planned, queue)) for _ in range(count)]
+            workers += [asyncio.create_task(self._work(planned.name)) for _ in range(count)]
         try:
             # One worker's error must not end the others, whose calls are paid for.
             ended = await asyncio.gather(*workers, return_exceptions=True)
@@ -304,16 +302,17 @@ class Session:
         await asyncio.gather(*workers, return_exceptions=True)
         await self._store.records.drain()
 
-    async def _work(self, planned: ModelConfig, queue: deque[Sample]) -> None:
+    async def _work(self, model: str) -> None:
         """Ask until the queue is empty; it is emptied when its model or the run is stopped."""
+        queue = self._queues[model]
         while queue:
             try:
-                await self._one(queue.popleft(), planned)
+                await self._one(queue.popleft())
             except UnavailableError as error:
                 queue.clear()
-                if planned.name not in self.result.stopped:
-                    self.result.stopped[planned.name] = str(error)
-                    self.watch(ModelEvent(planned.name, "stopped", str(error)))
+                if model not in self.result.stopped:
+                    self.result.stopped[model] = str(error)
+                    self.watch(ModelEvent(model, "stopped", str(error)))
             except BudgetReachedError as error:
                 self._stop(Stopping("cost", str(error)))
             except HaltedError:
@@ -356,23 +355,21 @@ class Session:
         finally:
             self._waiting.discard(task)
 
-    async def _one(self, sample: Sample, config: ModelConfig) -> None:
+    async def _one(self, sample: Sample) -> None:
         """Ask one sample, judge the reply, and wait until its record is on disk."""
         item = sample.track.shown(sample.item, sample.seed)
-        if sample.track.plays:
-            record = await self._play(sample, item, config)
-        else:
-            record = await self._ask(sample, item, config)
+        record = await (self._play if sample.track.plays else self._ask)(sample, item)
         await self._store.records.put(record)
         summary = Summary.of(record)
         self.result.add(summary)
         self.watch(SampleDone(summary))
 
-    async def _ask(self, sample: Sample, item: Item, config: ModelConfig) -> Record:
-        track, shows = sample.track, self._models[sample.model].needs_messages
-        made = track.request(item, sample.sent_seed, config.params, with_messages=shows)
-        request = replace(await self._until_stopped(made), sample=sample.id)
-        fields = self._fields(sample, item, await self._answer(request, config), request, config)
+    async def _ask(self, sample: Sample, item: Item) -> Record:
+        track, params = sample.track, sample.model.params
+        shows = self._models[sample.model.name].needs_messages
+        made = track.request(item, sample.sent_seed, params, with_messages=shows)
+        request = await self._until_stopped(made)
+        fields = self._fields(sample, item, request, await self._answer(sample, request))
         record, is_cancelled = await to_its_end(judge_reply(track, item, fields))
         task = asyncio.current_task()
         if is_cancelled and task is not None:
@@ -380,73 +377,62 @@ class Session:
             task.cancel()
         return record
 
-    async def _play(self, sample: Sample, item: Item, config: ModelConfig) -> Record:
-        track, shows = sample.track, self._models[sample.model].needs_messages
-        episode = track.start(item, sample.sent_seed, config.params, with_messages=shows)
+    async def _play(self, sample: Sample, item: Item) -> Record:
+        track, params = sample.track, sample.model.params
+        shows = self._models[sample.model.name].needs_messages
+        episode = track.start(item, sample.sent_seed, params, with_messages=shows)
         replies: list[Reply] = []
-        fields = self._fields(sample, item, None, None, config)
-        while (wanted := await self._until_stopped(episode.request())) is not None:
-            request = replace(wanted, sample=sample.id)
-            answer = await self._answer(request, config)
-            fields = self._fields(sample, item, answer, request, config)
+        fields = self._fields(sample, item, None, None)
+        while (request := await self._until_stopped(episode.request())) is not None:
+            answer = await self._answer(sample, request)
+            fields = self._fields(sample, item, request, answer)
             if not isinstance(answer, Reply):
                 break
             replies.append(answer.storable())
             episode.take(replies[-1], fields["prompt"])
         return judge_episode(track, item, fields, episode, replies)
 
-    async def _answer(self, request: Request, config: ModelConfig) -> Reply | ModelError | None:
+    async def _answer(self, sample: Sample, request: Request) -> Reply | ModelError | None:
         """Return the reply, or an error that concerns only this sample."""
+        name, request = sample.model.name, replace(request, sample=sample.id)
+        ask = self._models[name].ask
+        if name in self.present:
+            ask = partial(self._ask_once, sample.model)
         try:
-            return await self._until_stopped(self._models[config.name].ask(request))
+            return await self._until_stopped(ask(request))
         except UnavailableError:
             raise
         except ModelError as error:
             return error
 
+    async def _ask_once(self, model: ModelConfig, request: Request) -> Reply | None:
+        """Return the answer of a model in this process, or its answer to an earlier command.
+
+        It cannot be asked again, so its answer is written at once.
+        """
+        key = reply_key(model, request)
+        if (kept := self._store.kept(key)) is not None:
+            return kept
+        reply = await self.present[model.name].ask(request)
+        if reply is not None:
+            call = await self._store.sent(model.name, request.sample, key, 0.0)
+            await self._store.ended(call, 0.0, reply)
+        return reply
+
     def _fields(
-        self,
-        sample: Sample,
-        item: Item,
-        answer: Reply | ModelError | None,
-        request: Request | None,
-        config: ModelConfig,
+        self, sample: Sample, item: Item, request: Request | None, answer: Reply | ModelError | None
     ) -> dict[str, Any]:
         """Return the fields of a record before it is judged."""
-        track = sample.track
-        fields = begun(sample.id, track, sample.model, item, sample.seed, answer)
+        track, model = sample.track, sample.model
+        fields = begun(sample.id, track, model.name, item, sample.seed, answer)
         fields["run"] = self._store.run
         if sample.variant.levels:
             fields["variant"] = dict(sample.variant.levels)
         if request is not None and request.messages and track.prompt is not None:
             fields["prompt"] = self._store.keep_prompt(request, track.prompt.name)
-        if request is not None and request.response_format and config.kind == "litellm":
-            fields["asked"] = "response_format" if config.sends_format else "prompt"
+        if request is not None and request.response_format and model.kind == "litellm":
+            fields["asked"] = "response_format" if model.sends_format else "prompt"
         return fields
-
-
-class _Journaled:
-    """A model in this process that cannot be asked again; its answers are written at once."""
-
-    needs_messages = True
-
-    def __init__(self, model: Model, config: ModelConfig, journal: RunStore) -> None:
-        self.name = model.name
-        self.aclose = model.aclose
-        self._ask = model.ask
-        self._config = config
-        self._journal = journal
-
-    async def ask(self, request: Request) -> Reply | None:
-        """Return the model's answer, or its answer to an earlier command."""
-        key = reply_key(self._config, request)
-        if (kept := self._journal.kept(key)) is not None:
-            return kept
-        reply = await self._ask(request)
-        if reply is not None:
-            call = await self._journal.sent(self.name, request.sample, key, 0.0)
-            await self._journal.ended(call, 0.0, reply)
-        return reply
 
 
 async def to_its_end(work: Coroutine[Any, Any, _Result]) -> tuple[_Result, bool]:

@@ -22,7 +22,7 @@ from phyblock.errors import SimulationError
 from phyblock.records.files import STOPPED
 from phyblock.run.plan import make_plan
 from phyblock.run.rescore import rescore
-from phyblock.run.runner import SampleDone, Session, Stopping, to_its_end
+from phyblock.run.runner import SampleDone, Session, Stopping
 from phyblock.run.store import AppendFile
 from phyblock.sim import dynamics
 from phyblock.tracks.full_planning import FullPlanning
@@ -66,25 +66,25 @@ def prepare(workspace, server, *names):
 
 @pytest.mark.parametrize("name", [signal.SIGINT, signal.SIGTERM])
 def test_calls_under_way_are_waited_for_and_nothing_more_is_asked(workspace, name):
-    with prepare(workspace, OpenAIChat(holds=True)) as server:
+    with prepare(workspace, OpenAIChat(holds=True), "alpha", "beta") as server:
         code, out, err = interrupted(workspace.start(), server, name)
 
         assert (code, err) == (130, "")
-        assert f"{AT_ONCE} of {SAMPLES} samples are done (interrupted)" in out
+        assert f"{AT_ONCE} of {2 * SAMPLES} samples are done (interrupted)" in out
         assert f"phyblock run suite.yaml --out {workspace.out}" in out
         assert server.requests == AT_ONCE
         assert [record["outcome"] for record in workspace.records()] == ["ok"] * AT_ONCE
 
         server.faults = Faults()
         done = workspace.completed()
-        assert f"All {SAMPLES} samples are done" in done.out
-        assert server.requests == SAMPLES
+        assert f"All {2 * SAMPLES} samples are done" in done.out
+        assert server.requests == 2 * SAMPLES
         before = workspace.files()
         again = workspace.run()
         assert again.code == 0
         assert again.out
         assert done.out.endswith(again.out)
-        assert server.requests == SAMPLES
+        assert server.requests == 2 * SAMPLES
         assert workspace.files() == before
 
 
@@ -336,39 +336,6 @@ def words_of(process):
     return []
 
 
-def test_calls_that_wait_for_their_turn_are_not_sent_any_more(workspace):
-    with prepare(workspace, OpenAIChat(holds=True), "alpha", "beta") as server:
-        code, _, _ = interrupted(workspace.start(), server, signal.SIGINT)
-    assert code == 130
-    assert server.requests == AT_ONCE
-    assert len(workspace.records()) == AT_ONCE
-
-
-def test_a_wait_before_another_attempt_is_given_up(workspace):
-    with prepare(workspace, OpenAIChat(Faults(rate_limited=1.0, retry_after="100"))) as server:
-        process = workspace.start()
-        wait_for(lambda: server.requests == AT_ONCE and not server.at_once)
-        process.send_signal(signal.SIGINT)
-        code, out, err = ended(process)
-    assert (code, err) == (130, "")
-    assert f"0 of {SAMPLES} samples are done" in out
-    assert not workspace.records()
-    assert server.requests == AT_ONCE
-
-
-def test_a_wait_for_a_server_that_cannot_be_reached_is_given_up(workspace):
-    workspace.write_models("http://127.0.0.1:9", "alpha")
-    workspace.write_suite(models=["alpha"], seeds=[0, 1, 2, 3])
-    process = workspace.start()
-    while "no connection to 127.0.0.1:9" not in process.stdout.readline():
-        assert process.poll() is None
-    process.send_signal(signal.SIGINT)
-    code, out, err = ended(process)
-    assert (code, err) == (130, "")
-    assert f"0 of {SAMPLES} samples are done (interrupted)" in out
-    assert not workspace.records()
-
-
 def test_work_of_a_worker_that_was_killed_is_done_again_once(tmp_path):
     async def work():
         assert await shop.work_out(partial(killed, tmp_path, 1)) == "done"
@@ -380,26 +347,3 @@ def test_work_of_a_worker_that_was_killed_is_done_again_once(tmp_path):
         asyncio.run(work())
     finally:
         shop.close()
-
-
-def test_what_must_be_done_is_done_though_nobody_waits():
-    done = []
-
-    async def work():
-        await asyncio.sleep(0.05)
-        done.append("work")
-        return "record"
-
-    async def wait():
-        return await to_its_end(work())
-
-    async def cancelled():
-        waiting = asyncio.create_task(wait())
-        for _ in range(3):
-            await asyncio.sleep(0.01)
-            waiting.cancel()
-        return await waiting
-
-    assert asyncio.run(cancelled()) == ("record", True)
-    assert done == ["work"]
-    assert asyncio.run(wait()) == ("record", False)
