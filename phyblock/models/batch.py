@@ -20,7 +20,7 @@ from typing import Any, TypeVar
 from phyblock.config.models import ModelConfig
 from phyblock.errors import ModelError, RetryableError, UnavailableError
 from phyblock.files import atomic_write, load_json, writing
-from phyblock.models.batch_providers import PROVIDERS, UNREADABLE, BatchProvider, BatchStatus
+from phyblock.models.batch_providers import PROVIDERS, UNREADABLE, BatchProvider
 from phyblock.models.cache import ReplyCache, reply_key
 from phyblock.models.client import Answer, Client, HttpClient
 from phyblock.models.costs import ModelBudget, Reservation, cost_usd, estimate, may_be_billed
@@ -331,9 +331,20 @@ class BatchModel:
             raise UnavailableError(str(error), status=error.status, sent=error.sent) from None
 
     async def _answered(self, batch: Batch, path: Path) -> bytes | None:
-        """Wait for a batch and keep its answers; None if it was refused as a whole."""
+        """Poll a batch until it has ended and keep its answers; None if it was refused."""
+        pause_s, logged = min(_FIRST_PAUSE_S, self.files.poll_s), ""
         try:
-            status = await self._last_status(batch)
+            while True:
+                status = await self._patiently(partial(self._provider.status, batch.id))
+                if status.state != "running":
+                    break
+                if status.words != logged:
+                    logged = status.words
+                    since = batch.created.astimezone().strftime("%d %b %H:%M")
+                    self._say(f"waiting for batch {batch.shown} since {since}: {logged}")
+                await asyncio.sleep(pause_s)
+                pause_s = min(self.files.poll_s, 1.5 * pause_s)
+            self._say(f"batch {batch.shown} has ended: {status.words}")
             if status.state == "refused":
                 self._refusal = UnavailableError(f"batch {batch.shown} was refused: {status.words}")
                 self._settle_all(batch, 0.0)
@@ -349,21 +360,6 @@ class BatchModel:
             await asyncio.to_thread(atomic_write, path, lines, sync=True)
         await self._note(batch, "ended", words=status.words)
         return lines
-
-    async def _last_status(self, batch: Batch) -> BatchStatus:
-        """Poll a batch until it has ended; return its last state."""
-        pause_s, logged = min(_FIRST_PAUSE_S, self.files.poll_s), ""
-        while True:
-            status = await self._patiently(partial(self._provider.status, batch.id))
-            if status.state != "running":
-                self._say(f"batch {batch.shown} has ended: {status.words}")
-                return status
-            if status.words != logged:
-                logged = status.words
-                since = batch.created.astimezone().strftime("%d %b %H:%M")
-                self._say(f"waiting for batch {batch.shown} since {since}: {logged}")
-            await asyncio.sleep(pause_s)
-            pause_s = min(self.files.poll_s, 1.5 * pause_s)
 
     async def _read(self, key: str, request: Request, batch: Batch) -> Reply:
         """Return the reply that a direct call would return for the answer; raises like it."""

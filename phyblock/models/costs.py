@@ -174,14 +174,11 @@ class Budget:
     only counts. `spent_usd` is the cost of settled calls, which includes that of earlier commands.
     """
 
-    max_cost_usd: float | None = None
+    max_usd: float = math.inf
     spent_usd: float = 0.0
     held_usd: float = 0.0
     holds: int = 0
     changed: asyncio.Event = field(default_factory=asyncio.Event)
-
-    def __post_init__(self) -> None:
-        self.max_usd = math.inf if self.max_cost_usd is None else self.max_cost_usd
 
 
 class ModelBudget:

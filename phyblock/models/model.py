@@ -49,63 +49,6 @@ class Clock:
     sleep: Callable[[float], Awaitable[None]] = asyncio.sleep
 
 
-class Limits:
-    """The limits of one model: requests in progress, and requests and tokens a minute.
-
-    Both a minute are kept in the same way: a request that starts delays the next one by its share
-    of a minute. So starts are even, and a request larger than a whole minute's tokens is sent too.
-    `overall` is shared by all models of a run; `cooling_s` returns how long no server of the model
-    may be asked, as after a 429.
-    """
-
-    def __init__(
-        self,
-        most: int,
-        overall: asyncio.Semaphore,
-        rpm: int | None = None,
-        tpm: int | None = None,
-        *,
-        cooling_s: Callable[[], float] = lambda: 0.0,
-        clock: Clock | None = None,
-    ) -> None:
-        self._under_way = asyncio.Semaphore(most)
-        self._overall = overall
-        self._request_s = 60.0 / rpm if rpm else 0.0
-        self._token_s = 60.0 / tpm if tpm else 0.0
-        self._next_by_requests_s = self._next_by_tokens_s = float("-inf")
-        self._cooling_s = cooling_s
-        self._clock = clock or Clock()
-        self._admission = asyncio.Lock()
-
-    @contextlib.asynccontextmanager
-    async def slot(self, tokens: int = 0) -> AsyncIterator[None]:
-        """Hold a place of the model and of the whole run; `tokens` are the most it can take.
-
-        Requests are admitted one after another; a model that waits for its turn holds no place that
-        another model could use.
-        """
-        async with self._under_way:
-            async with self._admission:
-                while (wait_s := max(self._cooling_s(), self._next_s() - self._clock.now())) > 0:
-                    # In short waits, since tokens may be released or the last server given up.
-                    await self._clock.sleep(min(wait_s, 1.0))
-                await self._overall.acquire()
-                now_s = self._clock.now()
-                self._next_by_requests_s = now_s + self._request_s
-                self._next_by_tokens_s = now_s + self._token_s * tokens
-            try:
-                yield
-            finally:
-                self._overall.release()
-
-    def release(self, tokens: int) -> None:
-        """Give back tokens that a request turned out not to take."""
-        self._next_by_tokens_s -= self._token_s * tokens
-
-    def _next_s(self) -> float:
-        return max(self._next_by_requests_s, self._next_by_tokens_s)
-
-
 @dataclass(frozen=True)
 class ModelEvent:
     """An event of a model, or of the whole run ("") to show to the user, with a safe message.
@@ -288,6 +231,56 @@ class Servers:
                 self.report(f"{server.name} is not used any more: {error}")
 
 
+class Limits:
+    """The limits of one model: requests in progress, and requests and tokens a minute.
+
+    Both a minute are kept in the same way: a request that starts delays the next one by its share
+    of a minute. So starts are even, and a request larger than a whole minute's tokens is sent too.
+    `overall` is shared by all models of a run.
+    """
+
+    def __init__(self, config: ModelConfig, overall: asyncio.Semaphore, servers: Servers) -> None:
+        self._under_way = asyncio.Semaphore(config.max_concurrency)
+        self._overall = overall
+        self._servers = servers
+        self._clock = servers.policy.clock
+        self._request_s = 60.0 / config.rpm if config.rpm else 0.0
+        self._token_s = 60.0 / config.tpm if config.tpm else 0.0
+        self._next_by_requests_s = self._next_by_tokens_s = float("-inf")
+        self._admission = asyncio.Lock()
+
+    @contextlib.asynccontextmanager
+    async def slot(self, tokens: int = 0, failed: Server | None = None) -> AsyncIterator[Server]:
+        """Hold a place of the model and of the whole run, at the server to ask.
+
+        Requests are admitted one after another; a model that waits for its turn holds no place that
+        another model could use. `tokens` are the most that the request can take; the server that
+        just `failed` it is the last choice.
+        """
+        async with self._under_way:
+            async with self._admission:
+                while (wait_s := self._wait_s()) > 0:
+                    # In short waits, since tokens may be released or the last server given up.
+                    await self._clock.sleep(min(wait_s, 1.0))
+                await self._overall.acquire()
+                now_s = self._clock.now()
+                self._next_by_requests_s = now_s + self._request_s
+                self._next_by_tokens_s = now_s + self._token_s * tokens
+            try:
+                with self._servers.chosen(failed) as server:
+                    yield server
+            finally:
+                self._overall.release()
+
+    def release(self, tokens: int) -> None:
+        """Give back tokens that a request turned out not to take."""
+        self._next_by_tokens_s -= self._token_s * tokens
+
+    def _wait_s(self) -> float:
+        next_s = max(self._next_by_requests_s, self._next_by_tokens_s)
+        return max(self._servers.cooling_s(), next_s - self._clock.now())
+
+
 @dataclass
 class _Call:
     """A request with its estimate, attempts, cost, and the server that failed last. If
@@ -325,10 +318,8 @@ class ChatModel:
     async def ask(self, request: Request) -> Reply:
         """Return the cached reply, or a new one, which is then cached if it is complete.
 
-        `cost_usd` of a cached reply is what it would cost today. Raises as `Model.ask`.
-
-        When cancelled while it waits, it gives up at once. When cancelled during a request, which
-        is paid for, it returns the answer; a second cancellation gives that up too.
+        `cost_usd` of a cached reply is what it would cost today. It raises and is cancelled as
+        described in `Model.ask`.
         """
         key = reply_key(self.config, request)
         if self.journal is not None and (answered := self.journal.kept(key)) is not None:
@@ -359,20 +350,19 @@ class ChatModel:
     async def _attempt(self, call: _Call) -> Reply:
         """Send once, when limits and budget have room."""
         held, expected = None, call.expected
-        async with self.limits.slot(expected.most_tokens):
-            with self.servers.chosen(call.failed_at) as server:
-                if self.budget.tariff is not None:
-                    held = await self.budget.reserve(lambda: self.budget.most_usd(expected) or 0.0)
-                exchange = asyncio.ensure_future(self._exchange(call, server, held))
+        async with self.limits.slot(expected.most_tokens, call.failed_at) as server:
+            if self.budget.tariff is not None:
+                held = await self.budget.reserve(lambda: self.budget.most_usd(expected) or 0.0)
+            exchange = asyncio.ensure_future(self._exchange(call, server, held))
+            try:
+                return await asyncio.shield(exchange)
+            except asyncio.CancelledError:
+                call.is_cancelled = True
                 try:
-                    return await asyncio.shield(exchange)
-                except asyncio.CancelledError:
-                    call.is_cancelled = True
-                    try:
-                        return await exchange
-                    except RetryableError:
-                        # It would otherwise be sent again.
-                        raise asyncio.CancelledError from None
+                    return await exchange
+                except RetryableError:
+                    # It would otherwise be sent again.
+                    raise asyncio.CancelledError from None
 
     async def _exchange(self, call: _Call, server: Server, held: Reservation | None) -> Reply:
         """Write that a call is sent, send it, and write its end.
@@ -499,12 +489,5 @@ def build_model(
         for address in config.addresses or (None,)
     )
     servers = Servers(each, policy, lambda text: report(ModelEvent(config.name, "notice", text)))
-    limits = Limits(
-        config.max_concurrency,
-        overall or asyncio.Semaphore(config.max_concurrency),
-        config.rpm,
-        config.tpm,
-        cooling_s=servers.cooling_s,
-        clock=policy.clock,
-    )
+    limits = Limits(config, overall or asyncio.Semaphore(config.max_concurrency), servers)
     return ChatModel(servers=servers, limits=limits, journal=journal, **shared)

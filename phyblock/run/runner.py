@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import math
 import os
 import signal
 import threading
@@ -214,6 +215,7 @@ class Session:
                     result.add(known)
                 else:
                     self._queues[planned.name].append(sample)
+        most_usd = math.inf if limits.max_cost_usd is None else limits.max_cost_usd
         cache: ReplyCache | None = None
         if self.use_cache and any(model.kind == "litellm" for model in plan.models):
             cache = ReplyCache(reply_cache_file(), partial(self._notice, ""))
@@ -224,7 +226,7 @@ class Session:
             build_model,
             cache=cache,
             overall=asyncio.Semaphore(limits.max_concurrency),
-            budget=Budget(limits.max_cost_usd, progress.limit_usd),
+            budget=Budget(most_usd, progress.limit_usd),
             journal=store,
             report=self.watch,
             policy=RetryPolicy(limits.max_attempts, limits.retry_for_s),

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from phyblock.config.models import ModelConfig
 from phyblock.errors import (
     ModelError,
     RefusedError,
@@ -19,7 +20,7 @@ from phyblock.errors import (
 from phyblock.models.cache import ReplyCache, reply_key
 from phyblock.models.client import HttpClient
 from phyblock.models.costs import Budget
-from phyblock.models.model import Clock, Limits, RetryPolicy
+from phyblock.models.model import Clock, Limits, RetryPolicy, Server, Servers
 from phyblock.records.record import Reply
 from tests.models.factory import ROUTES, make_model, make_request
 from tests.servers.chassis import Faults, Running
@@ -59,6 +60,13 @@ class FakeTime:
             task.result()
 
 
+def limits_of(most, overall, clock=None, **fields):
+    """The limits of a model at one server."""
+    config = ModelConfig(name="m", id="openai/m", max_concurrency=most, **fields)
+    policy = RetryPolicy(clock=clock or Clock())
+    return Limits(config, overall, Servers((Server("http://one:1", None),), policy, print))
+
+
 calls = st.lists(
     st.tuples(st.floats(0, 200), st.floats(0, 90), st.integers(0, 300), st.integers(0, 300)),
     max_size=40,
@@ -74,7 +82,7 @@ async def test_requests_and_tokens_of_a_minute_keep_to_their_limits(arrivals, rp
     starts, ends = [], []
     inside = 0
     time = FakeTime()
-    limits = Limits(width, asyncio.Semaphore(width), rpm, tpm, clock=time.clock)
+    limits = limits_of(width, asyncio.Semaphore(width), time.clock, rpm=rpm, tpm=tpm)
 
     async def call(at_s, takes_s, most, unused):
         nonlocal inside
@@ -122,8 +130,8 @@ def test_tokens_count_as_reserved_until_a_reply_reports_them():
 async def test_a_model_waiting_for_its_minute_holds_no_place_that_another_could_use():
     time = FakeTime()
     overall = asyncio.Semaphore(1)
-    slow = Limits(5, overall, rpm=1, clock=time.clock)
-    quick = Limits(5, overall, clock=time.clock)
+    slow = limits_of(5, overall, time.clock, rpm=1)
+    quick = limits_of(5, overall, time.clock)
     finished_s = 0.0
 
     async def call(limits):
@@ -143,7 +151,7 @@ async def test_a_model_waiting_for_its_minute_holds_no_place_that_another_could_
 async def test_limits_survive_those_that_give_up(plans, width):
     """However many hold or wait and are cancelled, all places are free in the end."""
     overall = asyncio.Semaphore(width)
-    limits = Limits(width + 1, overall)
+    limits = limits_of(width + 1, overall)
     inside = 0
 
     async def hold(steps):

@@ -70,9 +70,9 @@ def ask_through(client, time, *, samples, width, was_heard=False):
         policy = RetryPolicy(clock=time.clock)
         server = Server("http://gone:1", client, was_heard=was_heard)
         servers = Servers((server,), policy, lambda _: None)
-        overall = asyncio.Semaphore(width)
-        limits = Limits(width, overall, cooling_s=servers.cooling_s, clock=time.clock)
-        config = ModelConfig(name="m", id="openai/m", api_base="http://gone:1/v1")
+        address = "http://gone:1/v1"
+        config = ModelConfig(name="m", id="openai/m", api_base=address, max_concurrency=width)
+        limits = Limits(config, asyncio.Semaphore(width), servers)
         model = ChatModel(
             config=config,
             servers=servers,

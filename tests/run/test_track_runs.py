@@ -11,8 +11,6 @@ import pytest
 import yaml
 from PIL import Image as PillowImage
 
-from phyblock.data.questions import read_questions
-from phyblock.data.scenes import read_builtin
 from phyblock.domain.question import LETTERS
 from phyblock.domain.scene import AssemblyTask, Candidate, CandidateSet, Scene
 from phyblock.errors import InputError, SpecError
@@ -20,8 +18,6 @@ from phyblock.results.compare import compare
 from phyblock.results.load import load_run
 from phyblock.run.rescore import rescore
 from phyblock.sim.engine import ENGINES, described_engine, installed_engines
-from phyblock.sim.pictures import PictureStyle
-from phyblock.sim.question_pictures import question_png
 from tests.servers.chassis import ISSUE_MIX, Faults, Running
 from tests.servers.openai_chat import OpenAIChat, StepAgent, said, told_history
 from tests.sim.structures import counterweighted_beam
@@ -131,51 +127,11 @@ def run_with(workspace, server, *args, models=("alpha",), seeds=(0,), **fields):
         return workspace.run(*args)
 
 
-def pictures_of(workspace):
-    """By question, the digest of each of its pictures by label, drawn here."""
-    scenes = read_builtin(workspace.root / "data")
-    found = read_questions(workspace.root / "questions", scenes)
-    style = PictureStyle(size_px=128)
-
-    def digests(question):
-        pngs = {picture.label: question_png(picture, style) for picture in question.pictures}
-        return {label: hashlib.sha256(png).hexdigest() for label, png in pngs.items()}
-
-    return {task.key: (task.question, digests(task.question)) for task in found.tasks}
-
-
 def shown(seen):
     """Caption and digest of each picture in the order in which they arrived."""
     parts = seen.parts[:-1]
     assert {kind for kind, _ in parts[1::2]} == {"image/png"}
     return [(caption, digest) for caption, (_, digest) in zip(parts[::2], parts[1::2], strict=True)]
-
-
-def test_pictures_arrive_in_order_each_with_its_caption(workspace):
-    server = OpenAIChat(say=a_cube)
-    done = run_with(workspace, server, "--limit", "8", subtasks=FEW_QUESTIONS)
-    assert (done.code, done.err) == (0, "")
-    drawn = pictures_of(workspace)
-    by_text = {question.text: (question, labels) for question, labels in drawn.values()}
-    assert server.requests == 8
-    for seen in server.seen:
-        found = re.search(r"^Question: (.*)$", str(seen.parts[-1]), re.MULTILINE)
-        question, labels = by_text[found[1]]
-        captions = {
-            "scene": "First picture:" if len(labels) > 1 else "Picture:",
-            "block": "Second picture, one block by itself:",
-            **{letter: f"Picture {letter}:" for letter in LETTERS},
-        }
-        order = [label for label in ("scene", "block", *LETTERS) if label in labels]
-        assert shown(seen) == [(captions[label], labels[label]) for label in order]
-        assert len(order) == {"SH": 1, "VP": 5, "OR": 4, "AD": 2}[question.subtask]
-    for record in workspace.records():
-        question = drawn[record["question"]["id"]][0]
-        assert record["answer"]["right"] == question.answer_letters
-        assert record["answer"]["correct"] == (
-            record["answer"]["given"] == record["answer"]["right"]
-        )
-        assert record["outcome"] == ("parse_failure" if question.subtask == "OR" else "ok")
 
 
 def test_pictures_of_official_files_are_sent_byte_for_byte(workspace):
