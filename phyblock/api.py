@@ -250,8 +250,9 @@ class Task:
     def request(self) -> Request:
         """Return the request as a run makes it; for an episode, the first one."""
         if self.plays:
-            request: Request = _result(self._start(shows=True).request())
-            return request
+            first = Episode(self).request
+            assert first is not None, "an episode begins with a request"
+            return first
         return _result(self.track.request(self.item, self.seed, {}, with_messages=True))
 
     def messages(self) -> list[dict[str, Any]]:
@@ -277,8 +278,8 @@ class Task:
         if self.plays and (reply is None or isinstance(reply, Sequence)):
             episode = Episode(self, shows=False)
             for one in [reply] if isinstance(reply, str) else reply or ():
-                if episode.step(one).done:
-                    break
+                if not episode.done:
+                    episode._take(one)
             return episode.score()
         if not (reply is None or isinstance(reply, str)):
             allowed = "a text, None" + (", a list of texts" if self.plays else "")
@@ -298,9 +299,6 @@ class Task:
     def _scored(self, record: Record) -> Score:
         suite = self.track.suite
         return Score(record, suite.settings[0], suite.scoring.matchers[0])
-
-    def _start(self, *, shows: bool) -> Any:
-        return self.track.start(self.item, self.seed, {}, with_messages=shows)
 
     def __deepcopy__(self, _: object) -> Task:
         return self
@@ -337,7 +335,8 @@ class Episode:
 
     def reset(self) -> list[dict[str, Any]]:
         """Start again; return the first messages."""
-        self._episode = self.task._start(shows=self._shows)
+        track, item, seed = self.task.track, self.task.item, self.task.seed
+        self._episode = track.start(item, seed, {}, with_messages=self._shows)
         self._replies: list[Reply] = []
         self._value = 0.0
         self.request: Request | None = _result(self._episode.request())
@@ -357,15 +356,18 @@ class Episode:
         """Take a step with a reply. Raises SpecError after the end, or if it is not a text."""
         if self.request is None:
             raise SpecError(Problem(self.task.id, "has ended", hint="call reset() before step()"))
+        self._take(reply)
+        score, before = self.score(), self._value
+        self._value = score.value
+        outcomes = getattr(score.record, "outcomes", None) or (score.outcome,)
+        return Turn(self.messages, self._value - before, self.done, str(outcomes[-1]))
+
+    def _take(self, reply: str) -> None:
         if not isinstance(reply, str):
             raise SpecError(Problem(self.task.id, "takes texts", "reply", repr(reply)))
         self._replies.append(Reply(text=well_formed(reply)).storable())
         self._episode.take(self._replies[-1])
         self.request = _result(self._episode.request())
-        score, before = self.score(), self._value
-        self._value = score.value
-        outcomes = getattr(score.record, "outcomes", None) or (score.outcome,)
-        return Turn(self.messages, self._value - before, self.done, str(outcomes[-1]))
 
     def score(self) -> Score:
         """Return the score of the episode so far."""
