@@ -19,7 +19,6 @@ from phyblock.models.litellm_client import known_providers
 from phyblock.records.files import read_records
 from phyblock.records.record import Reply
 from phyblock.sim.engine import ENGINES
-from phyblock.tracks.step_planning import StepPlanning
 from tests.servers.openai_chat import OpenAIChat
 from tests.tracks.conftest import raw_of, seesaw
 from tests.web.factory import LEVELS, manifest, record, score, write_run
@@ -122,9 +121,6 @@ def test_missing_recordings_and_unknown_providers_are_found(workspace):
 def test_a_model_at_hand_needs_no_litellm(model, monkeypatch):
     monkeypatch.setattr(litellm_client, "_litellm", lambda: pytest.fail("it was imported"))
     assert model.partition("/")[0] in known_providers(ModelConfig(name="m", id=model))
-
-
-REPORT = StepPlanning.report()
 
 
 @pytest.fixture(scope="module")

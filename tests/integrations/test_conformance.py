@@ -24,7 +24,6 @@ from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.shipped import reply_texts
 
-Scores = dict[tuple[str, str], float]
 OVERRIDES = ("parser=official", "scoring.matchers=[paper]", "images.size_px=128")
 
 
