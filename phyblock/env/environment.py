@@ -33,7 +33,7 @@ from phyblock.domain.scene import MAX_CANDIDATES, AssemblyTask, Block, Candidate
 from phyblock.files import bundled
 from phyblock.models.request import Image as SentImage
 from phyblock.scoring.pose import blocks_reached
-from phyblock.scoring.steps import Assembly
+from phyblock.scoring.steps import Assembly, Move
 from phyblock.sim.dynamics import (
     DEFAULT_TRIAL,
     ONE_SETTING,
@@ -109,27 +109,23 @@ class _BlockPlay:
             self._task, self._scene, self.candidates = task, task.scene, task.candidates
             self._lookout: Lookout | None = None
         self._assembly = Assembly(task.scene, task.candidates, self._setting, self._gating)
-        self._swapped: tuple[tuple[int, int], ...] = ()
+        self._move: Move | None = None
         self._settled = Settled((), ())
 
     def act(self, action: Any) -> tuple[str, float, bool] | None:
         if not 0 <= int(action) <= MAX_CANDIDATES:
             raise ValueError(f"action {action} is outside 0..{MAX_CANDIDATES}")
-        self._swapped = ()
-        if action == DONE:
+        self._move = None if action == DONE else self._assembly.move(int(action))
+        if self._move is None:
             return None
-        move = self._assembly.move(int(action))
-        self._swapped = move.swapped
-        is_placed = move.outcome == "placed"
+        is_placed = self._move.outcome == "placed"
         if is_placed:
             state = tuple(self._scene.blocks[vertex] for vertex in self._assembly.vertices)
-            self._settled = Settled((), state)
-            if self._physics != "off":
-                settled = settle(state, self._trial)
-                # Blocks that fall are held at their goal poses, or stay fallen under `strict`.
-                lying = settled.blocks if self._is_strict else state
-                self._settled = Settled(settled.fallen, lying)
-        return move.outcome, float(is_placed), is_placed
+            is_off = self._physics == "off"
+            settled = Settled((), state) if is_off else settle(state, self._trial)
+            # Blocks that fall are held at their goal poses, or stay fallen under `strict`.
+            self._settled = settled if self._is_strict else Settled(settled.fallen, state)
+        return self._move.outcome, float(is_placed), is_placed
 
     @property
     def has_ended(self) -> bool:
@@ -155,10 +151,10 @@ class _BlockPlay:
         return candidates_grid(self.candidates, self._style)[0]
 
     def info(self) -> dict[str, Any]:
-        blocks = self._scene.blocks
+        blocks, swapped = self._scene.blocks, self._move.swapped if self._move else ()
         return {
             "placed": tuple(blocks[vertex].order for vertex in self._assembly.vertices),
-            "swapped": tuple((blocks[a].order, blocks[b].order) for a, b in self._swapped),
+            "swapped": tuple((blocks[a].order, blocks[b].order) for a, b in swapped),
             "fallen": self._settled.fallen,
             "is_complete": self._assembly.is_complete,
         }
@@ -210,8 +206,7 @@ class _PosePlay:
         self._last = self._executor.step(put(PoseStep(number, (x, y, z)), self.candidates))
         self._named.append(number)
         before, self._reached = self._reached, self._count(self._scene.blocks)
-        end = self._last.end
-        return end, float(self._reached - before), end == "stands"
+        return self._last.end, float(self._reached - before), self._last.end == "stands"
 
     @property
     def has_ended(self) -> bool:
@@ -229,18 +224,13 @@ class _PosePlay:
 
     def right_moves(self) -> tuple[dict[str, Any], ...]:
         """The actions that place an unreached goal block on reached ones, low layers first."""
-        scene = self._scene
-        is_there = [self._count((block,)) == 1 for block in scene.blocks]
-        needs, layers = scene.graph.depends_on, scene.graph.layers
-        ready = [
-            vertex
-            for vertex in range(len(scene))
-            if not is_there[vertex] and all(is_there[below] for below in needs[vertex])
-        ]
-        moves = []
-        for block in (scene.blocks[v] for v in sorted(ready, key=lambda v: layers[v])):
-            if (number := self.candidates.index_of(block.look)) is not None:
-                center = np.array(center_cm(block)) / _CM
+        blocks, graph, moves = self._scene.blocks, self._scene.graph, []
+        is_there = [self._count((block,)) == 1 for block in blocks]
+        for vertex in sorted(range(len(blocks)), key=graph.layers.__getitem__):
+            number = self.candidates.index_of(blocks[vertex].look)
+            is_ready = all(is_there[below] for below in graph.depends_on[vertex])
+            if is_ready and not is_there[vertex] and number is not None:
+                center = np.array(center_cm(blocks[vertex])) / _CM
                 moves.append({"block": np.int64(number), "center_m": center})
         return tuple(moves)
 
@@ -324,7 +314,7 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
             raise ValueError("observe is 'text'; the prompt of a step is of action='block' alone")
         if action == "pose" and physics == "off":
             raise ValueError("physics is 'off'; a pose is carried out: allowed: settle, strict")
-        for name, most in (("max_steps", max_steps), ("max_failures", max_failures)):
+        for name, most in {"max_steps": max_steps, "max_failures": max_failures}.items():
             if most is not None and most < 1:
                 raise ValueError(f"{name} is {most}; allowed: 1 or more, or None")
         if not _SMALLEST_PX <= size_px <= LARGEST_PX:
@@ -335,8 +325,9 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
                 raise ValueError(f"levels is {levels!r}; allowed: several of {_LEVELS}, or None")
             tasks = tuple(task for task in tasks if set(task.scene.levels) & set(levels))
         if not tasks:
-            of = "" if levels is None else f" of levels {sorted(levels)}"
-            raise ValueError(f"data holds no tasks{of}")
+            raise ValueError(
+                f"data holds no tasks{f' of levels {sorted(levels)}' if levels else ''}"
+            )
         self._data = Dataset("data", Path("data"), tasks)
         self._scene = None if scene is None else self._data.task(scene).key
         self._observe = observe
@@ -353,31 +344,28 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
         self.render_mode = render_mode
         self._pictures: OrderedDict[tuple[Block, ...] | None, NDArray[np.uint8]] = OrderedDict()
         self._steps = self._most_steps = self._failures = 0
-        self._outcome, self._is_over = "begun", False
+        self._is_over = False
         self._prompter: StepPlanning | None = None
         if observe == "text":
-            rules = {"setting": setting, "gating": gating, "max_steps": max_steps or "null"}
-            said = [f"steps.{name}={value}" for name, value in rules.items()]
-            said.append("candidates.order=file")
+            said = [f"steps.setting={setting}", f"steps.gating={gating}", "candidates.order=file"]
+            said.append(f"steps.max_steps={max_steps or 'null'}")
             suite = load_suite(bundled("benchmarks", "steps.yaml"), said)
             self._prompter = StepPlanning(suite, self._data, shop=LocalShop())
         self._begin(self._task)
         self.action_space = self._play.action_space
-        parts: dict[str, spaces.Space[Any]] = {
-            name: spaces.Box(0, 255, (size_px, size_px, 3), np.uint8) for name in _PICTURES
-        }
+        parts: dict[str, spaces.Space[Any]] = {}
+        if observe == "state":
+            rows = {"goal": MOST_BLOCKS, "candidates": MAX_CANDIDATES}
+            rows |= {"world": MOST_BLOCKS} if action == "pose" else {}
+            for name, most in rows.items():
+                parts[name] = spaces.Box(-360.0, 360.0, (most, TRAITS), np.float32)
+            parts["placed"] = spaces.Box(0, 255, (MAX_CANDIDATES,), np.uint8)
+            parts["left"] = spaces.Box(0.0, 1.0, (1,), np.float32)
+        else:
+            for name in _PICTURES:
+                parts[name] = spaces.Box(0, 255, (size_px, size_px, 3), np.uint8)
         if observe == "text":
             parts["text"] = spaces.Text(_MOST_CHARACTERS, charset=string.printable)
-        if observe == "state":
-            goal = spaces.Box(-360.0, 360.0, (MOST_BLOCKS, TRAITS), np.float32)
-            parts = {
-                "goal": goal,
-                "candidates": spaces.Box(-360.0, 360.0, (MAX_CANDIDATES, TRAITS), np.float32),
-                "placed": spaces.Box(0, 255, (MAX_CANDIDATES,), np.uint8),
-                "left": spaces.Box(0.0, 1.0, (1,), np.float32),
-            }
-            if action == "pose":
-                parts["world"] = goal
         self.observation_space = cast(spaces.Space[Observation], spaces.Dict(parts))
 
     def reset(
@@ -387,12 +375,12 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
 
         Raises ValueError for any other option, DataError for an unknown scene.
         """
-        if unknown := sorted(map(str, set(options or {}) - {"scene"})):
+        given, tasks = options or {}, self._data.tasks
+        if unknown := sorted(map(str, set(given) - {"scene"})):
             raise ValueError(f"options has {', '.join(unknown)}; allowed: scene")
         super().reset(seed=seed)
-        name = (options or {}).get("scene", self._scene)
-        if name is None:
-            name = self._data.tasks[int(self.np_random.integers(len(self._data.tasks)))].key
+        if (name := given.get("scene", self._scene)) is None:
+            name = tasks[int(self.np_random.integers(len(tasks)))].key
         self._begin(self._data.task(str(name)))
         return self._observation(), self._info()
 
@@ -465,12 +453,12 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
         if len(goal) > MOST_BLOCKS:
             raise ValueError(f"a goal of {len(goal)} blocks; at most {MOST_BLOCKS} fit in a state")
         placed = np.bincount(play.chosen, minlength=MAX_CANDIDATES + 1)[1:]
-        left = 1 - self._steps / self._most_steps
+        left = max(0.0, 1 - self._steps / self._most_steps)
         state: Observation = {
             "goal": _rows(goal, MOST_BLOCKS),
             "candidates": _rows(play.candidates.candidates, MAX_CANDIDATES),
             "placed": placed.astype(np.uint8),
-            "left": np.array([max(0.0, left)], dtype=np.float32),
+            "left": np.array([left], dtype=np.float32),
         }
         if isinstance(play, _PosePlay):
             # If there are more blocks than rows, the last ones.

@@ -24,37 +24,14 @@ from phyblock.results.estimates import (
     track_notes,
 )
 from phyblock.results.load import Design, Run, checked_models, track_measures
-from phyblock.results.text import (
-    NO_VALUE,
-    Column,
-    TextTable,
-    intervals,
-    level_name,
-    number,
-    texts,
-    to_csv,
-    track_name,
-    values,
-    wholes,
-)
+from phyblock.results.text import NO_VALUE, Column, TextTable, level_name, number, to_csv
+from phyblock.scoring import statistics
 from phyblock.scoring.plan import Floats
-from phyblock.scoring.statistics import (
-    CONFIDENCE,
-    POWER,
-    Clusters,
-    bounded,
-    detectable,
-    holm,
-    jackknife,
-    least_p,
-    rank_ranges,
-    shift,
-)
 from phyblock.text import counted
 from phyblock.tracks.base import kind_of, kinds
 from phyblock.tracks.measures import SCORED_BY, Cell, Measure, in_unit
 
-_LEVEL = 1 - CONFIDENCE
+_LEVEL = 1 - statistics.CONFIDENCE
 _KEYS = ["scene", "item", "seed", "variant"]
 _JOINT = ("p_holm", "verdict", "detectable_holm")
 """Columns of `Comparison.table` that depend on all of its tests."""
@@ -238,9 +215,9 @@ class Comparable:
             known = {name: (single[..., n], there[..., n]) for n, name in enumerate(pooled)}
             return cell_value(cell, self.cells, known)[0]
 
-        clusters, scale = Clusters.of([parents[name] for name in scenes]), measure.scale
-        estimate = bounded(
-            jackknife(sums, clusters, lambda of: worth(of)[..., 0] - worth(of)[..., 1]),
+        clusters, scale = statistics.Clusters.of([parents[name] for name in scenes]), measure.scale
+        estimate = statistics.bounded(
+            statistics.jackknife(sums, clusters, lambda of: worth(of)[..., 0] - worth(of)[..., 1]),
             measure.most_apart / scale,
         )
         value_a, value_b = scale * worth(sums.sum(axis=0))
@@ -387,10 +364,10 @@ def compare_pairs(
             rows.append({**about, **what.contrast(samples, pair, part, parents)})
     table, measure = pd.DataFrame(rows), what.measure
     n_tests = int(table["p"].notna().sum())
-    table["p_holm"] = holm(table["p"])
+    table["p_holm"] = statistics.holm(table["p"])
     table["verdict"] = [_verdict(row, measure, n_tests) for row in table.to_dict("records")]
     level, spread = _LEVEL / max(n_tests, 1), (table["se"], table["n_clusters"])
-    table["detectable_holm"] = detectable(*spread, level, measure.most_apart)
+    table["detectable_holm"] = statistics.detectable(*spread, level, measure.most_apart)
     how = [what.how]
     for run in runs:
         if words := run.presentation(what.track):
@@ -406,7 +383,7 @@ def _verdict(row: Mapping[Any, Any], measure: Measure, n_tests: int) -> str:
         return "cannot tell: a single base scene"
     if row["p_holm"] >= _LEVEL:
         # With so few base scenes, no corrected p value can be below the level.
-        too_few = n_tests * least_p(row["n_clusters"]) >= _LEVEL
+        too_few = n_tests * statistics.least_p(row["n_clusters"]) >= _LEVEL
         return "too few base scenes to tell" if too_few else "cannot tell"
     a_is_better = (row["difference"] > 0) == (measure.better == "higher")
     return f"{row['a' if a_is_better else 'b']} is better"
@@ -448,13 +425,12 @@ def _ranks(table: pd.DataFrame, measure: Measure, ranked: Sequence[Side]) -> pd.
     for row in (pairs if len(pairs) else whole).to_dict("records"):
         known |= {row["a"]: row["value_a"], row["b"]: row["value_b"]}
     is_better = np.zeros((len(names), len(names)), dtype=bool)
-    for row, p in zip(pairs.to_dict("records"), holm(pairs["p"]), strict=True):
+    for row, p in zip(pairs.to_dict("records"), statistics.holm(pairs["p"]), strict=True):
         a, b = names.index(row["a"]), names.index(row["b"])
         a_is_better = (row["difference"] > 0) == (measure.better == "higher")
         is_better[(a, b) if a_is_better else (b, a)] = p < _LEVEL
-    rows = [
-        (name, known[name], *of) for name, of in zip(names, rank_ranges(is_better), strict=True)
-    ]
+    ranges = zip(names, statistics.rank_ranges(is_better), strict=True)
+    rows = [(name, known[name], *ends) for name, ends in ranges]
     return pd.DataFrame(rows, columns=columns).sort_values(
         "value", ascending=measure.better == "lower", ignore_index=True, kind="stable"
     )
@@ -468,21 +444,21 @@ def rank_text(best: int, worst: int) -> str:
 def compare_view(found: Comparison) -> TextTable:
     """Return a table with a row per pair and part, without the part if there is only one."""
     group = in_unit(found.name, found.unit)
-    columns = [texts("a", "A", once=True), texts("b", "B", once=True)]
+    columns = [Column.text("a", "A", once=True), Column.text("b", "B", once=True)]
     if found.table["part"].nunique() > 1:
         part = lambda row: level_name(row["part"].replace("_", " "))  # noqa: E731
         columns.append(Column("Part", "", True, part))
     p_text = lambda row: "< 0.001" if row["p_holm"] < 0.001 else number(row["p_holm"], 3)  # noqa: E731
     columns += [
-        *(values("value_a", "A", group), values("value_b", "B", group)),
-        values("difference", "A - B", group, signed=True),
-        intervals(group, signed=True),
-        values("detectable_holm", "finds", group),
+        *(Column.value("value_a", "A", group), Column.value("value_b", "B", group)),
+        Column.value("difference", "A - B", group, signed=True),
+        Column.interval(group, signed=True),
+        Column.value("detectable_holm", "finds", group),
         Column("p (Holm)", show=p_text),
-        texts("verdict", "Verdict"),
-        wholes("better", "A better", "Samples"),
-        wholes("worse", "B better", "Samples"),
-        wholes("same", "same", "Samples"),
+        Column.text("verdict", "Verdict"),
+        Column.whole("better", "A better", "Samples"),
+        Column.whole("worse", "B better", "Samples"),
+        Column.whole("same", "same", "Samples"),
     ]
     title = "Models compared on the same samples"
     return TextTable.of(found.table, title, columns, _notes(found))
@@ -499,8 +475,9 @@ def _notes(found: Comparison) -> Iterator[str]:
             "independent."
         )
         yield (
-            f"“finds”: the difference that this comparison would find in {POWER:.0%} of cases. "
-            f"{NO_VALUE}: none that is possible, or no sample differs."
+            "“finds”: the difference that this comparison would find in "
+            f"{statistics.POWER:.0%} of cases. {NO_VALUE}: none that is possible, or no sample "
+            "differs."
         )
     yield (
         f"p values are corrected for {table['p'].notna().sum()} comparisons (Holm); “cannot tell” "
@@ -511,8 +488,8 @@ def _notes(found: Comparison) -> Iterator[str]:
 def ranks_view(found: Comparison) -> TextTable:
     """Return a table of `Comparison.ranks`, the best model first."""
     columns = [
-        texts("model", "Model"),
-        values("value", in_unit(found.name, found.unit)),
+        Column.text("model", "Model"),
+        Column.value("value", in_unit(found.name, found.unit)),
         Column("Rank", show=lambda row: rank_text(row["best"], row["worst"])),
     ]
     note = (
@@ -562,11 +539,11 @@ def sensitivity_frame(run: Run) -> pd.DataFrame:
             whole = by_way.dropna()
             if whole.empty:
                 continue
-            clusters = Clusters.of([parents[scene] for scene, _ in whole.index])
+            clusters = statistics.Clusters.of([parents[scene] for scene, _ in whole.index])
             scores = np.moveaxis(whole.to_numpy().reshape(len(whole), *sizes), 1, -1)
             for place, factor in enumerate(factors, 1):
                 levels = np.moveaxis(scores, place, 1)
-                part = shift(levels.reshape(*levels.shape[:2], -1), clusters)
+                part = statistics.shift(levels.reshape(*levels.shape[:2], -1), clusters)
                 sd, lo, hi = (what.measure.scale * end for end in (part.sd, part.lo, part.hi))
                 row = {"track": track, "model": side.model, "factor": factor, "shift": sd}
                 row |= {"levels": levels.shape[1], "shift_lo": lo}
@@ -580,9 +557,9 @@ def sensitivity_table(run: Run) -> TextTable | None:
     table, tracks = sensitivity_frame(run), run.design.suite.tracks
     if table.empty:
         return None
-    columns = [texts("model", "Model"), *track_name(tracks)]
+    columns = [Column.text("model", "Model"), *Column.track(tracks)]
     columns.append(Column("Factor", "", True, lambda row: row["factor"].replace("_", " ")))
-    columns += [values("shift", "Shift"), intervals("", "shift_lo", "shift_hi")]
+    columns += [Column.value("shift", "Shift"), Column.interval("", "shift_lo", "shift_hi")]
     notes = [
         f"{kind_of(str(track)).title}: {comparable(run, str(track)).measure.heading_in_unit}, "
         f"{sizes_text(group)}."

@@ -9,7 +9,7 @@ import pandas as pd
 
 from phyblock.results.estimates import track_estimates
 from phyblock.results.load import Run
-from phyblock.results.text import TextTable, number, texts, values
+from phyblock.results.text import Column, TextTable, number
 from phyblock.tracks.measures import CELL, OVERALL
 
 _SETTING = "A"
@@ -86,13 +86,13 @@ def beside_paper(run: Run) -> TextTable | None:
             shown["model"] = f"{row['model']} ({row['published_name']})"
         shown |= {f"{row[CELL]} {name}": row[name] for name in ("published", "ours", "difference")}
     headings = {cell.name: cell.heading for cell in run.cells("full_planning")}
-    columns = [texts("model", "Model", once=True), texts("metric", "")]
+    columns = [Column.text("model", "Model", once=True), Column.text("metric", "")]
     for cell in dict.fromkeys(frame[CELL]):
         group = headings.get(cell, cell)
         columns += [
-            values(f"{cell} published", "Paper", group),
-            values(f"{cell} ours", "Ours", group, 2),
-            values(f"{cell} difference", "Diff", group, 2, signed=True),
+            Column.value(f"{cell} published", "Paper", group),
+            Column.value(f"{cell} ours", "Ours", group, 2),
+            Column.value(f"{cell} difference", "Diff", group, 2, signed=True),
         ]
     compared = frame["difference"].dropna()
     notes = ["Ours: setting A, micro averages. Published: micro averages of one run."]

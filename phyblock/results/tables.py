@@ -30,13 +30,8 @@ from phyblock.results.text import (
     Summary,
     TextTable,
     captioned,
-    intervals,
     number,
-    texts,
     to_csv,
-    track_name,
-    values,
-    wholes,
 )
 from phyblock.text import counted
 from phyblock.tracks.base import kind_of, kinds
@@ -85,7 +80,7 @@ def filled(run: Run, track: str, layout: Layout) -> TextTable:
             key = (model, one.measure or part, one.cell or part, one.criterion)
             row |= {name: getattr(known.get(key, _NONE), end) for name, end in one.ends.items()}
         rows.append(row)
-    fields = [texts("model", "Model", once=True)]
+    fields = [Column.text("model", "Model", once=True)]
     if layout.rows != "model":
         fields.append(Column("", "", True, lambda row: parts[row["part"]]))
     fields += [one.column for one in shown]
@@ -132,11 +127,11 @@ def _shown(
             key = spec.key.format(**about)
             at = (name, "" if layout.rows == "cell" else cell.name, spec.criterion)
             if spec.show != "interval":
-                shown = values(key, heading or unit, group, spec.digits)
+                shown = Column.value(key, heading or unit, group, spec.digits)
                 yield _Shown(shown, {key: "value"}, *at)
             if spec.show != "value":
                 lo, hi = f"{key}_lo", f"{key}_hi"
-                yield _Shown(intervals(group, lo, hi), {lo: "lo", hi: "hi"}, *at)
+                yield _Shown(Column.interval(group, lo, hi), {lo: "lo", hi: "hi"}, *at)
 
 
 def _sample_notes(run: Run, track: str) -> Iterator[str]:
@@ -229,9 +224,9 @@ def coverage_frame(run: Run) -> pd.DataFrame:
 def coverage_table(run: Run) -> TextTable:
     """Return a table of the outcomes of every model's samples."""
     table = coverage_frame(run)
-    fields = [texts("model", "Model"), *track_name(run.design.suite.tracks)]
+    fields = [Column.text("model", "Model"), *Column.track(run.design.suite.tracks)]
     for name in ("expected", "not_run", *OUTCOMES):
-        fields.append(wholes(name, _HEADINGS.get(name, name.replace("_", " ").capitalize())))
+        fields.append(Column.whole(name, _HEADINGS.get(name, name.replace("_", " ").capitalize())))
     notes = ["The last line of records.jsonl was cut off and is ignored."] if run.is_cut else []
     return TextTable.of(table[_COVERAGE], f"Coverage{run.design.of_suite}", fields, notes)
 
@@ -251,13 +246,13 @@ def cost_table(run: Run) -> TextTable:
 
     headings = zip(TOKENS, ("in", "out", "reasoning"), strict=True)
     fields = [
-        texts("model", "Model"),
-        *track_name(("", *run.design.suite.tracks)),
-        wholes("replies", "Replies"),
-        *(values(name, heading, "Tokens a reply", 0) for name, heading in headings),
+        Column.text("model", "Model"),
+        *Column.track(("", *run.design.suite.tracks)),
+        Column.whole("replies", "Replies"),
+        *(Column.value(name, heading, "Tokens a reply", 0) for name, heading in headings),
         *(dollars("cost_usd", "this run"), dollars("cost_per_100_usd", "100 replies")),
-        values("latency_median_s", "median", "Latency (s)", 2),
-        values("latency_p90_s", "90 %", "Latency (s)", 2),
+        Column.value("latency_median_s", "median", "Latency (s)", 2),
+        Column.value("latency_p90_s", "90 %", "Latency (s)", 2),
     ]
     notes = ["Replies from the cache cost this run nothing; 100 replies are priced as if asked."]
     notes += [
@@ -370,9 +365,9 @@ def headline_table(run: Run, track: str, coverage: pd.DataFrame) -> TextTable:
         row |= {column.heading: value.value for column, value in zip(columns, found, strict=True)}
         samples = f"{mine[model]['recorded']:,}/{mine[model]['expected']:,}"
         rows.append({**row, "lo": found[0].lo, "hi": found[0].hi, "samples": samples})
-    fields = [texts("rank", "#"), texts("model", "Model")]
-    fields += [values(column.heading, column.heading) for column in columns]
-    fields.insert(3, intervals())
+    fields = [Column.text("rank", "#"), Column.text("model", "Model")]
+    fields += [Column.value(column.heading, column.heading) for column in columns]
+    fields.insert(3, Column.interval())
     if any(row["not_run"] for row in mine.values()):
         fields.append(Column("Samples", show=lambda row: str(row["samples"])))
     caption = captioned(f"{kind.title}{run.design.of_suite}{unit}", run.presentation(track))

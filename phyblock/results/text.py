@@ -9,7 +9,7 @@ import re
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import jinja2
 
@@ -37,6 +37,36 @@ class Column:
     is_text: bool = False
     show: Callable[[Row], str] = lambda _: NO_VALUE
     once: bool = False
+
+    @classmethod
+    def text(cls, key: str, heading: str, *, once: bool = False) -> Self:
+        """Return a column of text."""
+        return cls(heading, "", True, lambda row: str(row[key]), once)
+
+    @classmethod
+    def track(cls, tracks: Sequence[str]) -> list[Self]:
+        """Return the column with the track of a row, or none if there is only one track."""
+        show = cls("Track", "", True, lambda row: str(row["track"]).replace("_", " "))
+        return [show] if len(tracks) > 1 else []
+
+    @classmethod
+    def whole(cls, key: str, heading: str, group: str = "") -> Self:
+        """Return a column of whole numbers."""
+        return cls(heading, group, show=lambda row: f"{row[key]:,}")
+
+    @classmethod
+    def value(
+        cls, key: str, heading: str, group: str = "", digits: int = 1, *, signed: bool = False
+    ) -> Self:
+        """Return a column of numbers with `digits` decimals."""
+        return cls(heading, group, show=lambda row: number(row[key], digits, signed=signed))
+
+    @classmethod
+    def interval(
+        cls, group: str = "", lo: str = "lo", hi: str = "hi", *, signed: bool = False
+    ) -> Self:
+        """Return a column of intervals between two columns of the frame."""
+        return cls("95 % CI", group, show=lambda row: between(row[lo], row[hi], signed=signed))
 
 
 @dataclass(frozen=True)
@@ -87,34 +117,6 @@ class TextTable:
         """Return the table as plain values for JSON."""
         columns = [[column.name, column.group, column.is_text] for column in self.columns]
         return {"caption": self.caption, "columns": columns, "rows": self.rows, "notes": self.notes}
-
-
-def texts(key: str, heading: str, *, once: bool = False) -> Column:
-    """Return a column of text."""
-    return Column(heading, "", True, lambda row: str(row[key]), once)
-
-
-def wholes(key: str, heading: str, group: str = "") -> Column:
-    """Return a column of whole numbers."""
-    return Column(heading, group, show=lambda row: f"{row[key]:,}")
-
-
-def values(
-    key: str, heading: str, group: str = "", digits: int = 1, *, signed: bool = False
-) -> Column:
-    """Return a column of numbers with `digits` decimals."""
-    return Column(heading, group, show=lambda row: number(row[key], digits, signed=signed))
-
-
-def intervals(group: str = "", lo: str = "lo", hi: str = "hi", *, signed: bool = False) -> Column:
-    """Return a column of intervals between two columns of the frame."""
-    return Column("95 % CI", group, show=lambda row: between(row[lo], row[hi], signed=signed))
-
-
-def track_name(tracks: Sequence[str]) -> list[Column]:
-    """Return the column with the track of a row, or none if there is only one track."""
-    show = Column("Track", "", True, lambda row: str(row["track"]).replace("_", " "))
-    return [show] if len(tracks) > 1 else []
 
 
 def number(value: float, digits: int = 1, *, signed: bool = False) -> str:
