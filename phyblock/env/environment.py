@@ -325,9 +325,7 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
                 raise ValueError(f"levels is {levels!r}; allowed: several of {_LEVELS}, or None")
             tasks = tuple(task for task in tasks if set(task.scene.levels) & set(levels))
         if not tasks:
-            raise ValueError(
-                f"data holds no tasks{f' of levels {sorted(levels)}' if levels else ''}"
-            )
+            raise ValueError(f"data holds no tasks of levels {sorted(levels or _LEVELS)}")
         self._data = Dataset("data", Path("data"), tasks)
         self._scene = None if scene is None else self._data.task(scene).key
         self._observe = observe

@@ -15,17 +15,11 @@ from phyblock.records.record import PictureMark, PromptMessage, Record
 from phyblock.results.load import TOKENS, Run
 from phyblock.results.text import to_csv
 
-_TYPES = {
-    **dict.fromkeys(("sample", "track", "model", "scene"), "string"),
-    "seed": "int64",
-    **dict.fromkeys(("levels", "parents"), "object"),
-    "n_blocks": "Int64",
-    **dict.fromkeys(("outcome", "finish", "rule"), "string"),
-    **dict.fromkeys(("cost_usd", "latency_s"), "Float64"),
-    **dict.fromkeys(("attempts", *TOKENS), "Int64"),
-    "cached": "boolean",
-}
-"""Columns that frames of records also have."""
+_SAME = (
+    *("sample", "track", "model", "scene", "seed", "levels", "parents", "n_blocks", "outcome"),
+    *("finish", "rule", "cost_usd", "latency_s", "attempts", *TOKENS, "cached"),
+)
+"""Columns that frames of records also have, with types that know of missing values."""
 _TEXTS = ("prompt", "reply", "reasoning", "provider_model", "error", "asked")
 
 
@@ -41,8 +35,11 @@ def export_frame(run: Run) -> pd.DataFrame:
         types |= {column: kind for column, (kind, _) in record.exported.items()}
     for setting in run.design.suite.settings:
         types |= {f"{name}_{setting.lower()}": "Int64" for name in ("tp", "fp", "fn")}
-    frame = run.records[list(_TYPES)].astype(_TYPES)
-    frame[["levels", "parents"]] = frame[["levels", "parents"]].map(list)
+    frame = run.records[list(_SAME)]
+    lists = frame[["levels", "parents"]].map(list)
+    nullable = {"object": "string", "float64": "Float64"}
+    frame = frame.astype({n: nullable.get(str(kind), kind) for n, kind in frame.dtypes.items()})
+    frame[["levels", "parents"]] = lists
     if run.design.suite.vary.factors:
         frame.insert(5, "variant", run.records["variant"].astype("string"))
     prompts = read_prompts(run.path)

@@ -77,14 +77,11 @@ def beside_paper(run: Run) -> TextTable | None:
     if frame.empty:
         return None
     rows: dict[tuple[str, str], dict[str, object]] = {}
-    for model in dict.fromkeys(frame["model"]):
-        for metric, heading in _METRICS.items():
-            rows[model, metric] = {"model": model, "metric": heading}
     for row in frame.to_dict("records"):
-        shown = rows[row["model"], row["metric"]]
-        if row["published_name"] != row["model"]:
-            shown["model"] = f"{row['model']} ({row['published_name']})"
-        shown |= {f"{row[CELL]} {name}": row[name] for name in ("published", "ours", "difference")}
+        model, metric, name = row["model"], row["metric"], row["published_name"]
+        about = {"model": model if name == model else f"{model} ({name})"}
+        shown = rows.setdefault((model, metric), {**about, "metric": _METRICS[metric]})
+        shown |= {f"{row[CELL]} {part}": row[part] for part in ("published", "ours", "difference")}
     headings = {cell.name: cell.heading for cell in run.cells("full_planning")}
     columns = [Column.text("model", "Model", once=True), Column.text("metric", "")]
     for cell in dict.fromkeys(frame[CELL]):
