@@ -31,7 +31,7 @@ often as goals need them, and shows at least 3 % of every block's outline; 3 exc
 built-in set; 4 accepts only finished structures that are proven to stand; 5 simulates with more
 iterations of the contact solver.
 """
-QUESTION_SET_VERSION = 11
+QUESTION_SET_VERSION = 12
 """Increased whenever questions with the same name change, so that results are never mixed."""
 _Tasks = Sequence[tuple[Scene, CandidateSet]]
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import combinations, product
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -154,12 +154,14 @@ def drop_height_m(block: Block, others: Sequence[Block]) -> float:
     return clearance
 
 
-def support_graph(blocks: Sequence[Block]) -> dict[int, frozenset[int]]:
+def support_graph(
+    blocks: Sequence[Block], *, only_areas: bool = False
+) -> dict[int, frozenset[int]]:
     """For each block's order, the orders of the blocks it rests on; 0 is the ground.
 
-    B rests on A when they touch in an area, or an edge on a face, whose normal points up from A to
-    B within 45 degrees. An edge on the border of a face counts only for blocks without other
-    support.
+    B rests on A when they touch in an area, or, without `only_areas`, an edge on a face, whose
+    normal points up from A to B within 45 degrees. An edge on the border of a face counts only for
+    blocks without other support.
     """
     rests_on: dict[int, set[int]] = {block.order: set() for block in blocks}
     for block in blocks:
@@ -167,8 +169,10 @@ def support_graph(blocks: Sequence[Block]) -> dict[int, frozenset[int]]:
             rests_on[block.order].add(GROUND)
     on_rims: dict[int, set[int]] = {block.order: set() for block in blocks}
     for first, second in _near_pairs(blocks, CONTACT_TOLERANCE_M):
-        for rise, is_rim in _rises(*beside(first, second)):
-            carried = on_rims if is_rim else rests_on
+        for rise, touch in _rises(*beside(first, second)):
+            if only_areas and touch != "area":
+                continue
+            carried = on_rims if touch == "rim" else rests_on
             if rise > 0:
                 carried[second.order].add(first.order)
             elif rise < 0:
@@ -185,6 +189,8 @@ def _near_pairs(blocks: Sequence[Block], reach_m: float) -> Iterator[tuple[Block
 _KEPT_PAIRS = 1 << 16
 Turned = tuple[BlockType, Euler]
 """A block by its type and angles, without its place."""
+Touch = Literal["area", "edge", "rim"]
+"""Contact in an area, of an edge within a face, or of an edge on the border of a face."""
 
 
 def beside(first: Block, second: Block) -> tuple[Turned, Turned, tuple[float, float, float]]:
@@ -217,8 +223,8 @@ def _axes_at_one_place(first: Turned, second: Turned) -> tuple[Axes, ...]:
 @functools.lru_cache(maxsize=_KEPT_PAIRS)
 def _rises(
     first: Turned, second: Turned, way_m: tuple[float, float, float]
-) -> tuple[tuple[float, bool], ...]:
-    """Rise of the contact of each pair of touching pieces, and True if it is on a rim."""
+) -> tuple[tuple[float, Touch], ...]:
+    """Rise of the contact of each pair of touching pieces, and how they touch."""
     found = (_contact_rise(*pair) for pair in piece_pairs(at(first), at(second, way_m)))
     return tuple(one for one in found if one[0])
 
@@ -229,10 +235,10 @@ def piece_pairs(first: Block, second: Block) -> Iterator[tuple[ConvexPiece, Conv
         yield one, other, separating_axes(one, other)
 
 
-def _contact_rise(first: ConvexPiece, second: ConvexPiece, axes: Axes) -> tuple[float, bool]:
-    """Vertical part of the contact normal from first to second, and True if it is on a rim."""
+def _contact_rise(first: ConvexPiece, second: ConvexPiece, axes: Axes) -> tuple[float, Touch]:
+    """Vertical part of the contact normal from first to second, and how they touch."""
     if not -_MAX_CONTACT_OVERLAP_M <= axes.gap_m <= CONTACT_TOLERANCE_M:
-        return 0.0, False
+        return 0.0, "rim"
     rim = 0.0
     touching = axes.gaps_m > axes.gap_m - CONTACT_TOLERANCE_M
     for direction in axes.directions[touching & (np.abs(axes.directions[:, 2]) >= _MIN_VERTICAL)]:
@@ -243,14 +249,14 @@ def _contact_rise(first: ConvexPiece, second: ConvexPiece, axes: Axes) -> tuple[
             x, y = shared.T
             area_m2 = abs(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1))) / 2
             if area_m2 > _MIN_AREA_M2:
-                return float(direction[2]), False
+                return float(direction[2]), "area"
         elif np.linalg.norm(shared - shared[0], axis=1).max() > _MIN_LENGTH_M:
             # One piece is an edge; its rim runs less than a millimeter inside the other's face.
             face = lower if len(lower) > 2 else upper
             if _depth_inside(shared.mean(axis=0), face) >= _LINE_M:
-                return float(direction[2]), False
+                return float(direction[2]), "edge"
             rim = float(direction[2])
-    return rim, True
+    return rim, "rim"
 
 
 def contact_corners_m(

@@ -20,6 +20,7 @@ from phyblock.making.questions.dynamics import (
     THIN_M,
     WIDE_M,
     AffordanceMaker,
+    balances_on_edges,
     bench,
     four_plans,
     free_tops,
@@ -197,6 +198,24 @@ def test_a_bench_leaves_the_scene_as_it_is_and_its_lever_says_what_stays(pillar_
     for stays in (True, False):
         assert said[stays, stays] > 4 * said[stays, not stays]
     assert broken
+
+
+@pytest.mark.parametrize(
+    ("sides", "euler", "is_on_edges"),
+    [("triangle", (135.0, 0.0, 0.0), True), ("cube", (0.0, 0.0, 0.0), False)],
+)
+def test_what_lies_on_edges_when_a_block_goes_is_told_from_what_lies_on_tops(
+    sides, euler, is_on_edges
+):
+    """A roof over a cube, beside which are two ramps, or two cubes."""
+    blocks = (
+        block(1, (0.0, 0.0, 0.025)),
+        block(2, (0.0, 0.05, 0.025), kind=sides, euler=euler),
+        block(3, (0.0, -0.05, 0.025), kind=sides, euler=(euler[0], 0.0, 180.0)),
+        block(4, (0.0, 0.0, 0.05), (1, 2, 3), kind="triangle"),
+    )
+    assert balances_on_edges(blocks, 1, frozenset()) is is_on_edges
+    assert not balances_on_edges(blocks, 1, frozenset({4}))
 
 
 def test_what_plainly_becomes_of_a_block_is_what_statics_say():

@@ -205,6 +205,8 @@ class CounterfactualMaker(Maker):
             raise UnfairError(f"it is not sure what follows without block {order}")
         if not any(order in block.depend for block in shown.blocks):
             raise UnfairError(f"block {order} supports no other")
+        if balances_on_edges(shown.blocks, order, moved):
+            raise UnfairError(f"what block {order} leaves behind lies on nothing but edges")
         sight.require_seen(shown, sight.NAMED, [b for b in shown.blocks if b.order == order])
         if question.wording != "cf-color":
             right = _outcome_text(len(moved))
@@ -233,8 +235,17 @@ def falling(blocks: Sequence[Block], order: int) -> Lot | None:
         loose = lots_of([block for block in left if block.order in lot])
         is_so = is_balanced(still) and not any(is_balanced([*still, *one]) for one in loose)
         if is_so and surely_stands(blocks) and is_sure(left, lot):
-            return lot
+            return None if balances_on_edges(blocks, order, lot) else lot
     return None
+
+
+def balances_on_edges(blocks: Sequence[Block], order: int, moved: Lot) -> bool:
+    """True if a block that rested on the one that goes stays on edges alone: no one can tell."""
+    still = [block for block in blocks if block.order not in moved | {order}]
+    flat = support_graph(still, only_areas=True)
+    return any(
+        order in below and not flat.get(one, True) for one, below in _below(tuple(blocks)).items()
+    )
 
 
 def _joined(lots: Sequence[Lot], most: int, enough: int | None = None) -> set[Lot]:
