@@ -386,7 +386,7 @@ def blind_sentence(run: Run, track: str) -> str:
         if model not in run.design.baselines
     ]
     verb = "is" if len(above) == 1 else "are"
-    text = f"{sum(above)} of {counted(len(above), 'model')} {verb} above {named}"
+    text = f"{sum(above)} of {counted(len(above), 'model')} {verb} shown to be above {named}"
     if not above:
         text = f"The strongest baseline here that never sees the goal is {named}"
     title = f"{kind_of(track).title}: " if len(run.design.suite.tracks) > 1 else ""

@@ -144,7 +144,7 @@ def test_the_summary_ranks_models_and_says_who_is_above_the_blind_baseline():
     ranks = compare(run).ranks
     assert ranks[["model", "best", "worst"]].values.tolist() == [["beta", 1, 2], ["alpha", 1, 2]]
     (sentence,) = summary.blind
-    assert sentence.endswith("of 2 models are above goal-blind (50.0).")
+    assert sentence.endswith("of 2 models are shown to be above goal-blind (50.0).")
 
 
 LATEX = next(filter(shutil.which, ("pdflatex", "lualatex")), None)

@@ -147,7 +147,7 @@ def test_blind_baselines_are_scored_beside_models_without_being_named(workspace)
     workspace.write_yaml("suite.yaml", suite)
     done = workspace.completed()
     assert [record["model"] for record in workspace.records()] == ["again", *blind]
-    assert "0 of 1 model is above goal-blind" in done.out
+    assert "0 of 1 model is shown to be above goal-blind" in done.out
     # A run of baselines alone has those that it names.
     workspace.write_yaml("suite.yaml", {**suite, "models": ["random"]})
     workspace.out = workspace.root / "alone"
