@@ -124,25 +124,19 @@ class Goal:
         looks, kinds = (
             _groups(getattr(block, name) for block in scene.blocks) for name in (attribute, "kind")
         )
-        masks = {look: sum(1 << v for v in vertices) for look, vertices in looks.items()}
-        of_kind = {kind: sum(1 << v for v in vertices) for kind, vertices in kinds.items()}
-        ways = {
-            look: [(v, 1 << v, graph.needed_masks[v] | 1 << v) for v in vertices]
-            for look, vertices in looks.items()
-        }
         self.equal_to: dict[int, tuple[int, ...]] = {}
         self.equal: dict[int, int] = {}
         self.of_kind: dict[int, int] = {}
         self.ways: dict[int, list[tuple[int, int, int]]] = {}
         for index, candidate in enumerate(candidates.candidates, 1):
-            look = getattr(candidate, attribute)
-            self.equal_to[index] = looks.get(look, ())
-            self.equal[index] = masks.get(look, 0)
-            self.of_kind[index] = of_kind.get(candidate.kind, 0)
-            self.ways[index] = ways.get(look, [])
-        self.kinds = tuple(of_kind.values())
+            equal_to = looks.get(getattr(candidate, attribute), ())
+            self.equal_to[index], self.equal[index] = equal_to, _mask(equal_to)
+            self.of_kind[index] = _mask(kinds.get(candidate.kind, ()))
+            self.ways[index] = [(v, 1 << v, graph.needed_masks[v] | 1 << v) for v in equal_to]
+        self.kinds = tuple(map(_mask, kinds.values()))
         self.kind_of_look = {
-            mask: of_kind[scene.blocks[looks[look][0]].kind] for look, mask in masks.items()
+            _mask(vertices): _mask(kinds[scene.blocks[vertices[0]].kind])
+            for vertices in looks.values()
         }
 
     def choices(self, index: int, placed: int) -> list[int]:
@@ -167,6 +161,10 @@ class Goal:
         if not self.equal[index] & ~placed:
             return "incorrect_orientation"
         return "dependency_not_met"
+
+
+def _mask(vertices: Iterable[int]) -> int:
+    return sum(1 << vertex for vertex in vertices)
 
 
 def _groups(values: Iterable[Hashable]) -> dict[Hashable, tuple[int, ...]]:

@@ -55,14 +55,13 @@ _COLLAPSE_S = 3.0  # Time for fallen blocks to come to rest [s].
 
 @dataclass(frozen=True)
 class Stability:
-    """Result of a trial: orders that passed a limit, the largest movement [m] and turn [degrees].
+    """Result of a trial: orders that passed a limit, and the largest movement [m].
 
     `agreed` is true if all settings name the same blocks.
     """
 
     fallen: tuple[int, ...] = ()
     moved_m: float = 0.0
-    turned_deg: float = 0.0
     agreed: bool = True
 
     @classmethod
@@ -71,7 +70,6 @@ class Stability:
         return cls(
             fallen=tuple(sorted({order for one in parts for order in one.fallen})),
             moved_m=max((one.moved_m for one in parts), default=0.0),
-            turned_deg=max((one.turned_deg for one in parts), default=0.0),
             agreed=len({one.fallen for one in parts}) <= 1,
         )
 
@@ -135,20 +133,11 @@ def _is_proven(blocks: tuple[Block, ...]) -> bool:
 def groups(blocks: Sequence[Block], reach_m: float = REACH_M) -> tuple[tuple[Block, ...], ...]:
     """The blocks in groups with more than `reach_m` [m] of free space between them."""
     boxes = [bounds_m(block) for block in blocks]
-    left = set(range(len(blocks)))
-    touching: list[tuple[Block, ...]] = []
-    while left:
-        frontier = [min(left)]
-        left.remove(frontier[0])
-        members = []
-        while frontier:
-            at = frontier.pop()
-            members.append(at)
-            near = {other for other in left if boxes_near(boxes[at], boxes[other], reach_m)}
-            left -= near
-            frontier += sorted(near)
-        touching.append(tuple(blocks[member] for member in sorted(members)))
-    return tuple(touching)
+    found: list[list[int]] = []
+    for at, box in enumerate(boxes):
+        near = [one for one in found if any(boxes_near(boxes[n], box, reach_m) for n in one)]
+        found = [one for one in found if one not in near] + [sorted(sum(near, [at]))]
+    return tuple(tuple(blocks[n] for n in one) for one in sorted(found))
 
 
 def movement(blocks: Sequence[Block], poses: Mapping[int, Pose], trial: Trial) -> Stability:
@@ -156,8 +145,7 @@ def movement(blocks: Sequence[Block], poses: Mapping[int, Pose], trial: Trial) -
     moved = {b.order: poses[b.order].distance_m(Pose.goal(b)) for b in blocks}
     turned = {b.order: poses[b.order].angle_deg(Pose.goal(b)) for b in blocks}
     fallen = (o for o in moved if moved[o] > trial.limit_m or turned[o] > trial.limit_deg)
-    most_m, most_deg = (max(one.values(), default=0.0) for one in (moved, turned))
-    return Stability(tuple(sorted(fallen)), most_m, most_deg)
+    return Stability(tuple(sorted(fallen)), max(moved.values(), default=0.0))
 
 
 def wait(world: World, limit_s: float, quiet_s: float = QUIET_S) -> bool:

@@ -403,11 +403,11 @@ _SEEN_PX = 256
 
 def visible_shares(scene: Scene, style: PictureStyle) -> dict[int, float]:
     """For each block's order, the visible share of the pixels that it covers by itself, 0..1."""
-    camera, blocks = goal_camera(scene, style), scene.blocks
-    together = segments(blocks, camera, style.size_px)
+    camera = goal_camera(scene, style)
+    together = segments(scene.blocks, camera, style.size_px)
     shares = {}
-    for vertex, (block, one) in enumerate(zip(scene.blocks, blocks, strict=True)):
-        alone = segments([one], camera, style.size_px) == 0
+    for vertex, block in enumerate(scene.blocks):
+        alone = segments([block], camera, style.size_px) == 0
         shares[block.order] = float((together[alone] == vertex).sum() / max(alone.sum(), 1))
     return shares
 

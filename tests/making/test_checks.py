@@ -27,14 +27,14 @@ from phyblock.sim.dynamics import Trial
 from phyblock.sim.engine import Physics
 from phyblock.workers import open_workers
 from tests.shipped import DATA, TASKS, official_tasks
-from tests.sim.structures import built, designed_scene
+from tests.sim.structures import built
 from tests.sim.test_geometry import FLOATING, OVERLAPPING
 
 BUILT_IN = DATA / "phyblock-400"
 SHORT = Trial(duration_s=1.0, physics=(Physics(),))
 QUICK = replace(OURS, trial=SHORT)
 QUICK_FOREIGN = replace(FOREIGN, trial=SHORT)
-GATE = designed_scene("l1-gate")
+GATE = make_scene("l1-gate", (1,), built("arch; cuboid2:flat-y; triangle").blocks)
 OFFERED = make_candidates(GATE)
 
 
@@ -120,7 +120,7 @@ def test_duplicates_and_orphans_of_a_set_are_found():
 
     image = transformed(GATE.blocks, Symmetry(1, mirrored=True))
     copy = replace(GATE, id="copy", blocks=tuple(map(moved, image)), parents=(GATE.id,))
-    orphan = replace(designed_scene("l1-dog"), parents=("nowhere",))
+    orphan = replace(TASKS[0].scene, parents=("nowhere",))
     found = [(one.scene, one.check) for one in check_set([GATE, copy, orphan])]
     assert found == [("copy", "duplicate"), (orphan.id, "parents")]
 
