@@ -203,18 +203,20 @@ class Session:
         """
         plan, result, limits = self.plan, self.result, self.plan.suite.limits
         stack.callback(plan.close)
-        self._store = store = RunStore(self.folder, plan.manifest, plan.sample_ids())
+        samples = {planned.name: list(plan.samples(planned)) for planned in plan.models}
+        ids = frozenset(sample.id for each in samples.values() for sample in each)
+        self._store = store = RunStore(self.folder, plan.manifest, ids)
         stack.callback(store.close)
         progress = store.progress
         earlier: dict[str, list[Summary]] = {name: [] for name in self._queues}
-        for planned in plan.models:
-            for sample in plan.samples(planned):
+        for name, queue in self._queues.items():
+            for sample in samples[name]:
                 known = progress.samples.get(sample.id)
                 if known and (known.is_answered if self.retry_failed else known.is_final):
-                    earlier[planned.name].append(known)
+                    earlier[name].append(known)
                     result.add(known)
                 else:
-                    self._queues[planned.name].append(sample)
+                    queue.append(sample)
         most_usd = math.inf if limits.max_cost_usd is None else limits.max_cost_usd
         cache: ReplyCache | None = None
         if self.use_cache and any(model.kind == "litellm" for model in plan.models):

@@ -131,33 +131,23 @@ def test_each_line_that_fails_is_asked_again_or_ends_as_a_call_would(route, disk
     assert len(server.made[1].requests) == 5
 
 
-def test_what_expired_is_asked_again_and_what_was_answered_is_not(route, disk):
+@pytest.mark.parametrize("end", ["expired", "cancelled"])
+def test_a_batch_that_is_ended_keeps_its_answers_and_the_rest_is_asked_again(route, disk, end):
     # Of a batch that expired Gemini has no results at all.
-    places = range(4) if route == "gemini" else (0, 2)
-    faults = BatchFaults(ends={0: "expired"}, lines={0: dict.fromkeys(places, "expired")})
+    places = range(4) if (route, end) == ("gemini", "expired") else (1, 2)
+    faults = BatchFaults(ends={0: end}, lines={0: dict.fromkeys(places, end)})
     requests, budget = requests_of(4), Budget(1e9)
     with serving(route, faults) as (server, config):
         ended = run_command(config, disk, requests, budget=budget)
         assert [isinstance(one, RetryableError) for one in ended] == [n in places for n in range(4)]
-        # What was never asked costs nothing.
+        # It is not sent again at once, and what was never asked costs nothing.
+        assert len(server.made) == 1
         replies = [one for one in ended if isinstance(one, Reply)]
         assert {one.billed_usd == one.cost_usd for one in replies} <= {True}
         assert budget.spent_usd == pytest.approx(sum(one.billed_usd or 0.0 for one in replies))
         assert len(texts(run_command(config, disk, requests, recorded=requests))) == 4
     assert once(server, 4)
     assert [len(made.requests) for made in server.made] == [4, len(places)]
-
-
-def test_a_cancelled_batch_keeps_its_answers_and_is_not_sent_again_at_once(route, disk):
-    faults = BatchFaults(ends={0: "cancelled"}, lines={0: {1: "cancelled", 2: "cancelled"}})
-    requests = requests_of(4)
-    with serving(route, faults) as (server, config):
-        ended = run_command(config, disk, requests)
-        assert [isinstance(one, Reply) for one in ended] == [True, False, False, True]
-        assert isinstance(ended[1], RetryableError)
-        assert len(server.made) == 1
-        assert len(texts(run_command(config, disk, requests, recorded=requests))) == 4
-    assert once(server, 4)
 
 
 def test_a_refused_batch_stops_the_model_and_asks_nothing(disk):
