@@ -6,7 +6,7 @@ import asyncio
 import contextlib
 import functools
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from itertools import takewhile, tee
@@ -220,11 +220,11 @@ async def _again(track: Track, item: Item, record: Record, where: str, *, strict
         episode.take(turn.reply, turn.prompt)
     # What the last reply comes to shows when the next is asked for: blocks are let go.
     goes_on = await episode.request() is not None
-    judgement = episode.judgement()
-    pairs = zip(asked, judgement.fields["turns"], strict=False)
-    same = sum(1 for _ in takewhile(lambda pair: _led_on(*pair), pairs))
+    again = judged(track, item, given, episode.judgement())
+    pairs = zip(map(_decided, asked), map(_decided, again.asked_turns), strict=False)
+    same = sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], pairs))
     if same == len(asked) and not (goes_on and record.error is None):
-        return judged(track, item, given, judgement)
+        return again
     if strict:
         message = "does not go as it did: another version of phyblock made it"
         hint = "use the version of phyblock that made the run"
@@ -234,16 +234,7 @@ async def _again(track: Track, item: Item, record: Record, where: str, *, strict
     return record.model_copy(update={"error": error, "outcome": "api_error"})
 
 
-def _led_on(was: AskedTurn, now: Mapping[str, Any]) -> bool:
-    """True if a stored turn has the same result now, even if parsed by another rule."""
-    stored = was.fields()
-    decided = {name: value for name, value in now.items() if name not in ("reply", "prompt")}
-    return all(_plain(stored.get(name)) == _plain(value) for name, value in decided.items())
-
-
-def _plain(value: object) -> object:
-    """A value as JSON, without nulls and the rule of the parser."""
-    if isinstance(value, Mapping):
-        held = {name: below for name, below in value.items() if below is not None}
-        return {name: _plain(below) for name, below in held.items() if name != "rule"}
-    return [_plain(below) for below in value] if isinstance(value, list | tuple) else value
+def _decided(turn: AskedTurn) -> dict[str, Any]:
+    """Return the result of a turn, whichever rule parsed its reply."""
+    fields = set(type(turn).model_fields) - {"reply", "prompt"}
+    return turn.model_dump(include=fields, exclude={"parse": {"rule"}}, exclude_none=True)
