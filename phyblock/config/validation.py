@@ -29,7 +29,7 @@ from pydantic_core import (
     core_schema,
 )
 
-from phyblock.config.yaml import FieldPath, YamlSource, dotted, secrets, shown
+from phyblock.config.yaml import FieldPath, YamlSource, dotted, shown
 from phyblock.domain.blocks import BLOCK_TYPES, BlockType
 from phyblock.domain.question import SUBTASKS, Subtask
 from phyblock.errors import Problem, SpecError
@@ -203,21 +203,12 @@ class PictureControls(Section):
 
 
 def read_section(model: type[ModelT], source: YamlSource) -> ModelT:
-    """Return a YAML document as its model.
-
-    Raises SpecError with all problems in the order of the file. A text that looks like an API key
-    is a problem and is not shown, so that no key reaches a run folder.
-    """
-    problems = secrets(source)
-    hidden = {problem.field for problem in problems}
+    """Return a YAML document as its model. Raises SpecError with all problems, as in the file."""
     try:
-        instance = model.model_validate(source.data)
+        return model.model_validate(source.data)
     except ValidationError as error:
-        found = problems_of(error, model, source.data, source)
-        problems += [one for one in found if one.field not in hidden]
-    if problems:
-        raise SpecError(source.in_order(problems))
-    return instance
+        problems = problems_of(error, model, source.data, source)
+        raise SpecError(source.in_order(problems)) from None
 
 
 def problems_of(

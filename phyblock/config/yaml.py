@@ -7,10 +7,12 @@ merge keys (`<<`), no tags beyond the standard ones, no duplicate keys, no infin
 
 from __future__ import annotations
 
+import contextlib
 import json
+import math
 import os
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -185,27 +187,33 @@ def dump_yaml(data: object) -> str:
     return text
 
 
-def read_yaml(path: Path) -> YamlSource:
-    """Read a file. Raises SpecError if it cannot be read or is not YAML."""
+def read_yaml(path: Path, *, may_hold_keys: bool = False) -> YamlSource:
+    """Read a file as `parse_yaml` does. Raises SpecError if it cannot be read or is not YAML."""
     try:
         text = read_text(path, LARGEST_YAML_BYTES)
     except (OSError, ValueError) as error:
         raise SpecError(Problem(str(path), f"cannot be read: {reason_of(error)}")) from error
-    return parse_yaml(text, str(path))
+    return parse_yaml(text, str(path), may_hold_keys=may_hold_keys)
 
 
 def parse_yaml(
-    text: str, label: str, most_bytes: int = LARGEST_YAML_BYTES, base: FieldPath = ()
+    text: str,
+    label: str,
+    most_bytes: int = LARGEST_YAML_BYTES,
+    base: FieldPath = (),
+    *,
+    may_hold_keys: bool = False,
 ) -> YamlSource:
     """Read a text, whose data belongs at `base`.
 
     Raises SpecError if it is not YAML, holds more than plain data, or is larger or deeper than any
-    legitimate file.
+    legitimate file. What looks like an API key is refused without being shown, so that none reaches
+    a run folder; with `may_hold_keys` it is text, as in paths and names of scenes.
     """
     if len(text) > most_bytes:
         found, allowed = f"{len(text):,} characters", f"{most_bytes // 1024:,} kB at most"
         raise SpecError(Problem(label, "is too long", dotted(base), found, allowed))
-    walker = _Walker(label, most_bytes // _BYTES_A_VALUE)
+    walker = _Walker(label, most_bytes // _BYTES_A_VALUE, may_hold_keys)
     hint, loader = "", None
     try:
         loader = _Loader(text)
@@ -233,8 +241,9 @@ def parse_yaml(
 class _Walker:
     """Turns nodes into data, noting the place of each in `source`."""
 
-    def __init__(self, label: str, most_values: int) -> None:
+    def __init__(self, label: str, most_values: int, may_hold_keys: bool) -> None:
         self.source = YamlSource(label)
+        self._may_hold_keys = may_hold_keys
         self._most_values = self._left = most_values
 
     def build(self, node: yaml.Node, key: yaml.Node, path: FieldPath) -> Any:
@@ -279,18 +288,25 @@ class _Walker:
         lower = text.lower()
         if kind in ("int", "float") and len(text) > _LONGEST_NUMBER:
             raise self._error(node, path, "is a number that is too large", f"{len(text):,} digits")
-        try:
-            if kind == "int":
-                return int(lower, {"0o": 8, "0x": 16}.get(lower[:2], 10))
-            if kind == "float":
+        if kind in ("int", "float"):
+            with contextlib.suppress(ValueError):
+                if kind == "int":
+                    return int(lower, {"0o": 8, "0x": 16}.get(lower[:2], 10))
                 # Infinity and NaN (`.inf`, `.nan` in YAML) are not allowed.
-                return float(lower)
-        except ValueError:
-            raise self._error(node, path, "is not a finite number", shown(text)) from None
+                if math.isfinite(number := float(lower)):
+                    return number
+            raise self._error(node, path, "is not a finite number", shown(text))
         if kind == "bool" and lower in ("true", "false"):
             return lower == "true"
-        if kind in ("null", "str", "merge"):
-            return None if kind == "null" else text
+        if kind == "null":
+            return None
+        if kind in ("str", "merge"):
+            is_named = len(path) > 1 and str(path[-1]).lower() in _SECRET_KEYS
+            if not self._may_hold_keys and (is_named or looks_secret(text)):
+                message = "looks like a key, which must not be in a file"
+                hint = "name an environment variable with api_key_env, and keep the key in it"
+                raise self._error(node, path, message, hint=hint)
+            return text
         raise self._error(node, path, "has a tag that is not allowed", node.tag)
 
     def _text(self, node: yaml.ScalarNode, path: FieldPath) -> str:
@@ -308,23 +324,6 @@ class _Walker:
         return SpecError(Problem(where, message, dotted(path), found, hint=hint))
 
 
-def secrets(source: YamlSource) -> list[Problem]:
-    """Return a problem for each text that looks like a provider's key."""
-    hint = "name an environment variable with api_key_env, and keep the key in it"
-
-    def below(data: object, path: FieldPath) -> Iterator[Problem]:
-        if isinstance(data, dict | list):
-            for part, value in data.items() if isinstance(data, dict) else enumerate(data):
-                yield from below(value, (*path, part))
-        elif isinstance(data, str):
-            named = len(path) > 1 and str(path[-1]).lower() in _SECRET_KEYS
-            if named or looks_secret(data):
-                message = "looks like a key, which must not be in a file"
-                yield Problem(source.where(path), message, dotted(path), hint=hint)
-
-    return list(below(source.data, ()))
-
-
 def apply_overrides(source: YamlSource, overrides: Iterable[str]) -> None:
     """Set each "key=value" in the source's data, as if it were in the file.
 
@@ -340,7 +339,9 @@ def apply_overrides(source: YamlSource, overrides: Iterable[str]) -> None:
         try:
             value = parse_yaml(raw, where, base=path).data
         except SpecError as error:
-            problems = [replace(one, where=where, hint=QUOTE_HINT) for one in error.problems]
+            problems = [
+                replace(one, where=where, hint=one.hint or QUOTE_HINT) for one in error.problems
+            ]
             raise SpecError(problems) from None
         source.data = {} if source.data is None else source.data
         here, place = source.data, Place(where, where, is_override=True)

@@ -172,7 +172,7 @@ def read_manifest(folder: Path) -> Manifest:
 @functools.lru_cache(maxsize=2)
 def _manifest(text: str, where: str) -> Manifest:
     """Return a manifest; cached, since one command reads it several times."""
-    source = parse_yaml(text, where, _LARGEST_BYTES)
+    source = parse_yaml(text, where, _LARGEST_BYTES, may_hold_keys=True)
     return validated(Manifest, source.data, source)
 
 

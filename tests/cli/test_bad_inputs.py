@@ -276,7 +276,7 @@ INPUTS = (
         ("mine.j2:1: ", "'lipsum' is undefined"), writes=("fresh",)),
     Bad("prompt-pipe", pipe("mine.j2", *FRESH, "--set", "prompt=mine.j2"), ("no such file",)),
     Bad("infinite", models_text("a:\n  id: openai/x\n  extra_body: {k: [1e999]}\n"),
-        ("models.yaml:3:19: a.extra_body.k: cannot be sent as JSON", "numbers that are finite")),
+        ("models.yaml:3:20: a.extra_body.k[0]: is not a finite number", "1e999")),
     Bad("secret", models_text(f"mine:\n  id: openai/x\n  api_key: {FAKE_KEY}\n"),
         ("models.yaml:3:", "mine.api_key", "api_key_env")),
     Bad("provider", models_text(f"alpha: {{id: Qwen/x, api_base: 'http://{NOWHERE}/v1'}}\n"),

@@ -186,7 +186,7 @@ def _read(file: Path) -> Iterator[ReadScene]:
             where = f"{file}:{number}"
             yield _named(decode(adapter, line, where, GivenScene), f"{file.stem}-{number}", where)
         return
-    source = read_yaml(file)
+    source = read_yaml(file, may_hold_keys=True)
     data: Any = source.data
     at: FieldPath = ()
     if isinstance(data, dict) and "scenes" in data:
