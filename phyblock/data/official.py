@@ -29,6 +29,7 @@ from phyblock.data.questions import Options
 from phyblock.data.scenes import (
     NAME,
     NAME_ALLOWED,
+    CandidateList,
     Name,
     Order,
     Position,
@@ -36,7 +37,6 @@ from phyblock.data.scenes import (
     StoredCandidate,
     Text,
     candidate_set,
-    look_faults,
     task_of,
 )
 from phyblock.domain.question import (
@@ -48,7 +48,7 @@ from phyblock.domain.question import (
     Subtask,
     is_picture_option,
 )
-from phyblock.domain.scene import MAX_CANDIDATES, AssemblyTask, CandidateSet, Scene
+from phyblock.domain.scene import AssemblyTask, CandidateSet, Scene
 from phyblock.errors import DataError, Problem
 from phyblock.files import read_own_yaml
 from phyblock.records.record import Line, decode
@@ -92,12 +92,7 @@ def _number_faults(candidates: Sequence[_Numbered]) -> Iterator[Fault]:
             yield Fault("is wrong", allowed, str(candidate.position), (i - 1, "position"))
 
 
-_CandidateFile = Annotated[
-    tuple[_Numbered, ...],
-    Field(min_length=1, max_length=MAX_CANDIDATES),
-    checked(_number_faults),
-    checked(look_faults),
-]
+_CandidateFile = Annotated[CandidateList[_Numbered], checked(_number_faults)]
 
 
 def read_official(root: Path) -> Dataset:

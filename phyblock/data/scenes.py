@@ -10,7 +10,7 @@ import functools
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, TypeVar
 
 from pydantic import AfterValidator, AliasChoices, Field, PlainSerializer, StrictInt, TypeAdapter
 
@@ -124,6 +124,9 @@ class StoredCandidate(Line, extra="ignore"):
         return Candidate(self.type, self.color, self.euler)
 
 
+_CandidateT = TypeVar("_CandidateT", bound=StoredCandidate)
+
+
 def _graph(blocks: Sequence[StoredBlock]) -> AOVGraph:
     vertex = {block.order: v for v, block in enumerate(blocks)}
     return AOVGraph(tuple(frozenset(vertex[o] for o in b.depend if o) for b in blocks))
@@ -156,7 +159,7 @@ def _layer_faults(blocks: Sequence[StoredBlock]) -> Iterator[Fault]:
             yield Fault("is wrong", wanted, str(block.layer), (i, "layer"))
 
 
-def look_faults(candidates: Sequence[StoredCandidate]) -> Iterator[Fault]:
+def _look_faults(candidates: Sequence[StoredCandidate]) -> Iterator[Fault]:
     """Yield candidates that look the same as an earlier one."""
     first: dict[object, int] = {}
     for i, stored in enumerate(candidates):
@@ -175,9 +178,9 @@ SceneBlocks = Annotated[
 ]
 """Blocks with unique orders whose dependencies have no cycle."""
 CandidateList = Annotated[
-    tuple[StoredCandidate, ...],
+    tuple[_CandidateT, ...],
     Field(min_length=1, max_length=MAX_CANDIDATES),
-    checked(look_faults),
+    checked(_look_faults),
 ]
 """Candidates of which no two look the same."""
 Levels = Annotated[tuple[StrictInt, ...], OneOf(lambda: _LEVELS)]
@@ -196,7 +199,7 @@ class StoredScene(Line, extra="ignore"):
     cluster by them."""
     blocks: Annotated[SceneBlocks, checked(_layer_faults)]
     """The goal structure: 1 to 22 blocks."""
-    candidates: CandidateList
+    candidates: CandidateList[StoredCandidate]
     """1 to 16 candidates, numbered from 1 in this order. No two may look the same, and every block
     needs one that looks like it."""
     format: Format = 1

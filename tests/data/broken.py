@@ -66,20 +66,23 @@ def write_scenes(folder: Path, *scenes: Raw) -> Path:
     return write_lines(folder / "scenes.jsonl", scenes).parent
 
 
-def write_checkout(root: Path, *scenes: Raw) -> Path:
-    """The scenes in the official layout, `levels` becoming `level`."""
-    goals = root / "data" / "SCENEs_400_Goal_Jsons"
-    candidates = root / "data" / "SCENEs_400_Cand_Jsons"
-    goals.mkdir(parents=True, exist_ok=True)
-    candidates.mkdir(parents=True, exist_ok=True)
+def checkout_files(*scenes: Raw) -> dict[str, str]:
+    """The files of the scenes in the official layout by path, `levels` becoming `level`."""
+    files = {}
     for scene in scenes:
         goal = {"level": max(scene["levels"]), "blocks": scene["blocks"]}
-        numbered = [
-            {**entry, "position": number} for number, entry in enumerate(scene["candidates"], 1)
-        ]
-        (goals / f"{scene['id']}.json").write_text(json.dumps(goal), encoding="utf-8")
-        path = candidates / f"{scene['id']}_16_cand_blocks.json"
-        path.write_text(json.dumps(numbered), encoding="utf-8")
+        numbered = [{**one, "position": n} for n, one in enumerate(scene["candidates"], 1)]
+        folder, name = "data/SCENEs_400_", scene["id"]
+        files[f"{folder}Goal_Jsons/{name}.json"] = json.dumps(goal)
+        files[f"{folder}Cand_Jsons/{name}_16_cand_blocks.json"] = json.dumps(numbered)
+    return files
+
+
+def write_checkout(root: Path, *scenes: Raw) -> Path:
+    """The scenes in the official layout."""
+    for name, text in checkout_files(*scenes).items():
+        (root / name).parent.mkdir(parents=True, exist_ok=True)
+        (root / name).write_text(text, encoding="utf-8")
     return root
 
 

@@ -11,7 +11,7 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.data.broken import YAML_TEXTS, sound_scene
+from tests.data.broken import YAML_TEXTS, checkout_files, sound_scene
 from tests.fuzz.laws import Case, Fifo, Link
 from tests.fuzz.strategies import (
     CANDIDATES,
@@ -141,15 +141,11 @@ _REPLY_FILES = broken(st.just(_SOUND_REPLY), JSON_TOKENS) | st.builds(
 
 def _official(picture, candidates):
     """A checkout in the official layout with one picture and maybe broken candidates."""
-    scene = {**sound_scene(), "id": "000"}
-    goal = {"level": 2, "blocks": scene["blocks"]}
-    numbered = [{**entry, "position": n} for n, entry in enumerate(scene["candidates"], 1)]
-    folder = "official/data/SCENEs_400_"
-    files = {
-        f"{folder}Goal_Jsons/000.json": json.dumps(goal).encode(),
-        f"{folder}Cand_Jsons/000_16_cand_blocks.json": candidates or json.dumps(numbered).encode(),
-        f"{folder}Goal_and_Cand_Imgs_resized/000.png": picture,
-    }
+    whole = checkout_files({**sound_scene(), "id": "000"})
+    files = {f"official/{name}": text.encode() for name, text in whole.items()}
+    files["official/data/SCENEs_400_Goal_and_Cand_Imgs_resized/000.png"] = picture
+    if candidates:
+        files["official/data/SCENEs_400_Cand_Jsons/000_16_cand_blocks.json"] = candidates
     sets = ("dataset.format=official", "dataset.path=official", "images.source=dataset")
     return Case((*RUN, *_sets(sets)), files, ("fresh",))
 

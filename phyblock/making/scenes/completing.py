@@ -25,6 +25,7 @@ from phyblock.data.scenes import (
     Name,
     Order,
     Position,
+    StoredCandidate,
     candidate_set,
 )
 from phyblock.domain.blocks import KIT_PALETTE, Color
@@ -57,7 +58,7 @@ class GivenScene(Line, extra="forbid"):
     id: Name | None = None
     levels: Levels | None = None
     parents: tuple[Name, ...] = Field(default=(), max_length=100)
-    candidates: CandidateList | None = None
+    candidates: CandidateList[StoredCandidate] | None = None
     format: Format = 1
 
 
