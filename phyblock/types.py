@@ -63,8 +63,6 @@ Finish = Literal["stop", "length", "refusal", "unknown"]
 Outcome = Literal["ok", "parse_failure", "refusal", "truncated", "api_error", "missing"]
 OUTCOMES: tuple[Outcome, ...] = get_args(Outcome)
 """Every outcome, in the order of columns."""
-FAILURES: tuple[Outcome, ...] = tuple(outcome for outcome in OUTCOMES if outcome != "ok")
-"""Every outcome but `ok`."""
 WITHOUT_REPLY: tuple[Outcome, ...] = ("api_error", "missing")
 """Outcomes of samples without a reply; a refusal is a reply."""
 BATCH_PROVIDERS = ("openai", "hosted_vllm", "anthropic", "gemini")

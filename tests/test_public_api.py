@@ -67,7 +67,7 @@ def test_what_is_wrong_is_named():
         "render: show": lambda: phyblock.render(scene, show="all"),
         "background is 'sea'": lambda: phyblock.render(scene, background="sea"),
         "size_px is 5": lambda: phyblock.render(scene, size_px=5),
-        "tasks: track": lambda: phyblock.tasks("full"),
+        "tracks[0]: is not one of the choices": lambda: phyblock.tasks("full"),
         'split="test", vqa.path': lambda: phyblock.tasks("vqa", split="train"),
         "tasks: split: takes no data": lambda: phyblock.tasks("vqa", split="dev", data="x"),
         "tasks: limit": lambda: phyblock.tasks("vqa", limit=0),

@@ -25,7 +25,6 @@ from phyblock.run.runner import RunEvent, RunStarted, SampleDone
 from phyblock.run.store import Summary
 from phyblock.scoring.plan import Counts
 from phyblock.text import counted, one_line
-from phyblock.types import FAILURES
 
 _LINE_EVERY_S = 10.0
 """Interval of progress lines where no bar is shown [s]."""
@@ -47,7 +46,7 @@ class Tally:
 
     def add(self, sample: Summary) -> None:
         """Count one sample."""
-        self.failures.update([sample.outcome] if sample.outcome in FAILURES else [])
+        self.failures.update([sample.outcome] if sample.outcome != "ok" else [])
         if sample.counts is not None:
             self.counts += sample.counts
         if sample.cached is not None:
