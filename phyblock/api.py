@@ -80,7 +80,9 @@ def checked(function: Callable[_P, _T]) -> Callable[_P, _T]:
 
     def named(problem: Problem) -> Problem:
         """Return the problem with the name of a positional argument in place of its number."""
-        field = re.sub(r"^\[(\d+)\]", lambda at: names[: int(at[1]) + 1][-1], problem.field)
+        field = re.sub(
+            r"^\[(\d+)\]", lambda at: names[min(int(at[1]), len(names) - 1)], problem.field
+        )
         return replace(problem, field=field)
 
     @functools.wraps(function)

@@ -127,7 +127,7 @@ class Shards:
         """
         batch = _SharedBatch(self._folder / f"{call:04d}-{number:06d}.pickle", job)
         if (call + number) % self.count + 1 == self.number:
-            batch.start(fcntl.LOCK_NB)
+            batch.start(waits=False)
         return batch
 
 
@@ -139,14 +139,15 @@ class _SharedBatch:
     job: Callable[[Path], Future[Any]]
     started: Future[Any] | None = None
 
-    def start(self, waits: int = 0) -> None:
-        """Start the batch, unless its answers are there, after waiting for who computes them; with
-        LOCK_NB, leave it to them.
+    def start(self, *, waits: bool) -> None:
+        """Start the batch, unless its answers are there or another shard computes them.
+
+        If it `waits`, it starts the batch when that shard has ended without the answers.
         """
         with writing(self.path):
             lock = self.path.with_suffix(".lock").open("ab")
             try:
-                fcntl.flock(lock, fcntl.LOCK_EX | waits)
+                fcntl.flock(lock, fcntl.LOCK_EX | (0 if waits else fcntl.LOCK_NB))
             except BlockingIOError:
                 lock.close()
                 return
@@ -160,7 +161,7 @@ class _SharedBatch:
     def result(self) -> Any:
         """Return the answers."""
         if self.started is None:
-            self.start()
+            self.start(waits=True)
         return self.started.result() if self.started else pickle.loads(self.path.read_bytes())
 
     def cancel(self) -> None:
