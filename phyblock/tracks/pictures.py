@@ -148,16 +148,16 @@ class Workshop:
 
     def _kept(self, drawing: Drawing) -> Image | None:
         """Return a picture from memory or the cache; None if it is missing or damaged."""
-        if (image := self._recent.get((drawing.key, drawing.label))) is not None:
-            return image
-        if drawing.is_file:
-            return self._remembered(drawing, drawing.make())
-        # A damaged file is drawn again.
-        with contextlib.suppress(OSError, ValueError, DataError):
-            data = read_bytes(self._path(drawing.key), LARGEST_PICTURE_BYTES)
-            if data.startswith(_PNG_START) and data.endswith(_PNG_END):
-                return self._remembered(drawing, data)
-        return None
+        image = self._recent.get((drawing.key, drawing.label))
+        if image is None and drawing.is_file:
+            image = self._remembered(drawing, drawing.make())
+        elif image is None:
+            # A damaged file is drawn again.
+            with contextlib.suppress(OSError, ValueError, DataError):
+                data = read_bytes(self._path(drawing.key), LARGEST_PICTURE_BYTES)
+                if data.startswith(_PNG_START) and data.endswith(_PNG_END):
+                    image = self._remembered(drawing, data)
+        return image
 
     def _remembered(self, drawing: Drawing, data: bytes) -> Image:
         with open_picture(data, f"picture {drawing.label}") as opened:
@@ -210,38 +210,35 @@ def scene_drawings(task: AssemblyTask, images: ImagesSpec) -> tuple[Drawing, ...
     They are drawn, or cut out of the data set's own composites. A goal that is not shown does not
     affect the size. Raises DataError if the data set lacks a picture that it must provide.
     """
-    goal, grid, both = _own(task) if images.source == "dataset" else _drawn(task, images)
+    made = _own(task) if images.source == "dataset" else _drawn(task, images)
     if task.is_blind:
-        return (grid,)
-    if images.layout == "composite":
-        return (both,)
-    return (goal, grid) if images.order[0] == "goal" else (grid, goal)
+        return (made["candidates"],)
+    labels = ("composite",) if images.layout == "composite" else images.order
+    return tuple(made[label] for label in labels)
 
 
-def _drawn(task: AssemblyTask, images: ImagesSpec) -> tuple[Drawing, Drawing, Drawing]:
+def _drawn(task: AssemblyTask, images: ImagesSpec) -> dict[str, Drawing]:
     style = picture_style(images)
     style = style if task.is_blind else goal_style(task.scene, style)
     goal = Drawing.of("goal", goal_key, goal_png, task.scene, style)
     grid = Drawing.of("candidates", candidates_key, candidates_png, task.candidates, style)
     key, join = hex_digest(f"composite {goal.key} {grid.key}"), partial(_joined, goal, grid)
-    return goal, grid, Drawing("composite", key, join, joined_size_px(style.size_px))
+    both = Drawing("composite", key, join, joined_size_px(style.size_px))
+    return {one.label: one for one in (goal, grid, both)}
 
 
 def _joined(goal: Drawing, grid: Drawing) -> bytes:
     return composite_png(goal.make(), grid.make())
 
 
-def _own(task: AssemblyTask) -> tuple[Drawing, Drawing, Drawing]:
+def _own(task: AssemblyTask) -> dict[str, Drawing]:
     if (path := task.composite) is None:
         message, hint = "the data set has no picture of it", "use images.source: render"
         raise DataError(Problem(f"scene {task.key}", message, "images.source", hint=hint))
+    makes = {"goal": partial(_half, path, is_goal=True), "candidates": partial(_half, path)}
+    makes["composite"] = partial(read_picture, path)
     key = hex_digest(read_picture(path))
-    makes = partial(_half, path, is_goal=True), partial(_half, path), partial(read_picture, path)
-    labels = ("goal", "candidates", "composite")
-    goal, grid, both = (
-        Drawing(label, key, make, is_file=True) for label, make in zip(labels, makes, strict=True)
-    )
-    return goal, grid, both
+    return {label: Drawing(label, key, make, is_file=True) for label, make in makes.items()}
 
 
 def _half(composite: Path, *, is_goal: bool = False) -> bytes:
