@@ -21,9 +21,9 @@ from phyblock.results.compare import (
     sensitivity_frame,
     sizes_text,
 )
-from phyblock.results.estimates import Headline
+from phyblock.results.estimates import Headline, shown_values
 from phyblock.results.load import Run
-from phyblock.results.tables import coverage_frame, filled
+from phyblock.results.tables import coverage_frame
 from phyblock.results.text import between, level_name, number
 from phyblock.text import counted
 from phyblock.tracks.base import kind_of
@@ -197,34 +197,30 @@ def levels(run: Run, *, track: str) -> Figure | None:
 
 def shares(run: Run, *, track: str, table: str) -> Figure | None:
     """Draw stacked shares of a table over all cells, one row per model; None without shares."""
-    report = kind_of(track).report()
-    layout = report.tables[table]
-    frame, whole = filled(run, track, layout).frame, run.cells(track)[-1].name
-    if frame.empty:
-        return None
-    if layout.rows == "cell":
-        frame = frame[frame["part"] == whole]
+    report, values = kind_of(track).report(), shown_values(run, track)
+    layout, whole = report.tables[table], run.cells(track)[-1].name
     names = [name for spec in layout.columns for name in spec.measures]
-    if isinstance(layout.rows, str):
-        frame = frame.set_index("model")
-    elif whole in frame:
-        names = list(layout.rows)
-        frame = frame.pivot(index="model", columns="part", values=whole)
-    frame = frame[[name for name in names if name in frame]].dropna(how="all").fillna(0.0)
-    models = [model for model in Headline(run, track).ranked if model in frame.index]
-    if not models or not frame.to_numpy().any():
+    names = names if isinstance(layout.rows, str) else list(layout.rows)
+    found = {
+        model: [values[key].value if (key := (model, name, whole, "")) in values else math.nan
+                for name in names]
+        for model in Headline(run, track).ranked
+    }  # fmt: skip
+    models = [model for model, row in found.items() if not np.isnan(row).all()]
+    drawn = np.nan_to_num([found[model] for model in models])
+    if not drawn.any():
         return None
-    frame, headings = frame.loc[models], {one.name: one.heading for one in report.measures}
+    headings = {one.name: one.heading for one in report.measures}
     figure, (ax,) = _axes(0.6 + _ROW_IN * len(models))
     left = np.zeros(len(models))
-    for place, name in enumerate(map(str, frame)):
-        values, color = frame[name].to_numpy(np.float64), _COLORS[place % len(_COLORS)]
-        ax.barh(models, values, left=left, color=color, height=0.66, label=headings[name])
-        for row in np.flatnonzero(values >= 6 * WIDTH_IN / figure.get_figwidth()):
-            at = (float(left[row] + values[row] / 2), float(row))
+    for place, (name, widths) in enumerate(zip(names, drawn.T, strict=True)):
+        color = _COLORS[place % len(_COLORS)]
+        ax.barh(models, widths, left=left, color=color, height=0.66, label=headings[name])
+        for row in np.flatnonzero(widths >= 6 * WIDTH_IN / figure.get_figwidth()):
+            at = (float(left[row] + widths[row] / 2), float(row))
             middle: dict[str, Any] = {"ha": "center", "va": "center", "color": "white"}
-            ax.text(*at, f"{values[row]:.0f}", fontsize=6.5, **middle)
-        left += values
+            ax.text(*at, f"{widths[row]:.0f}", fontsize=6.5, **middle)
+        left += widths
     _named_rows(ax, models)
     ax.set(xlim=(0, 100), xlabel="%")
     title = layout.caption.removesuffix(" (%)")
@@ -334,8 +330,8 @@ def write_paper_figures(
             figure = makers[name](run)
             if figure is None:
                 continue
+            title, _, how = str(figure.get_label()).partition("\n")
             if titled:
-                title = str(figure.get_label()).partition("\n")[0]
                 lines = wrap(title, int(width_in * 11))
                 figure.set_figheight(figure.get_figheight() + _TITLE_IN * len(lines))
                 figure.suptitle("\n".join(lines), x=0.01, ha="left")
@@ -346,16 +342,8 @@ def write_paper_figures(
                 made[f"{name}.{ending}"] = drawn.getvalue()
                 # Laid out once: the next formats use the layout of the first.
                 figure.set_layout_engine("none")
-            made[f"{name}.txt"] = _caption(run, figure)
+            words = [word for track in run.design.suite.tracks for word in run.presentation(track)]
+            sentences = (title, how[:1].upper() + how[1:], ", ".join(dict.fromkeys(words)))
+            made[f"{name}.txt"] = " ".join(f"{one}." for one in sentences if one) + "\n"
             files += folder.write({f"{below}{file}": data for file, data in made.items()})
     return tuple(files)
-
-
-def _caption(run: Run, figure: Figure) -> str:
-    """Return the caption as a line of text."""
-    title, _, subtitle = str(figure.get_label()).partition("\n")
-    tracks = run.design.suite.tracks
-    words = [word for track in tracks for word in run.presentation(track)]
-    sentences = [title, subtitle[:1].upper() + subtitle[1:]]
-    sentences += [", ".join(dict.fromkeys(words))]
-    return " ".join(f"{sentence}." for sentence in sentences if sentence) + "\n"

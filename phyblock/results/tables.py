@@ -266,9 +266,8 @@ def cost_table(run: Run) -> TextTable:
 
 @dataclass(frozen=True, eq=False)
 class TablesWritten:
-    """The `tables` of a `run` by name, and their `files` in a `folder`."""
+    """The `tables` of a `run` by name, and their `files`."""
 
-    folder: Path
     files: tuple[Path, ...]
     tables: Mapping[str, TextTable]
     run: Run = field(repr=False)
@@ -290,7 +289,7 @@ def write_tables(path: str | Path) -> TablesWritten:
     # Coverage may be complete now, and an earlier table obsolete.
     known = set(table_files()) - set(texts)
     folder.remove(name for name in folder.names(f"{TABLES}/") if name in known)
-    return TablesWritten(run.path / TABLES, written, made, run)
+    return TablesWritten(written, made, run)
 
 
 def table_files() -> tuple[str, ...]:
