@@ -28,31 +28,15 @@ from phyblock.sim.pictures import LEAST_SHOWN, PictureStyle, hidden_blocks, visi
 
 
 @dataclass(frozen=True)
-class Finding:
-    """One problem of a scene, with a sentence that describes it.
+class Finding(Problem):
+    """One problem of the scene `where`, found by a check, with a sentence that describes it.
 
-    `blocks` are orders of blocks, 0 the ground. `field` is the place of `found` in the file;
-    `allowed` is the value by geometry, physics or a limit. `value_mm` was measured, and a value up
-    to `tolerance_mm` would pass.
+    `blocks` are orders of blocks, 0 the ground. `allowed` is what geometry, physics or a limit
+    asks for.
     """
 
-    scene: str
-    check: str
-    message: str
+    check: str = ""
     blocks: tuple[int, ...] = ()
-    field: str = ""
-    found: str = ""
-    allowed: str = ""
-    value_mm: float | None = None
-    tolerance_mm: float | None = None
-
-    @property
-    def problem(self) -> Problem:
-        """The finding as an error."""
-        return Problem(self.scene, self.message, self.field, self.found, self.allowed)
-
-    def __str__(self) -> str:
-        return str(self.problem)
 
 
 @dataclass(frozen=True)
@@ -109,16 +93,11 @@ class SceneFacts:
         graph = support_graph(self.scene.blocks)
         return {order: (below - {GROUND}) or below for order, below in graph.items()}
 
-    def finding(self, check: str, message: str, *blocks: int, **about: object) -> Finding:
-        """Return a finding about the scene; `about` are further fields of it."""
-        return Finding(self.scene.id, check, message, blocks, **about)  # type: ignore[arg-type]
 
-    def measured(
-        self, check: str, message: str, *blocks: int, value_m: float, limit_m: float
-    ) -> Finding:
-        """Return a finding about a length that exceeds a limit [m]."""
-        about = {"value_mm": value_m * 1000, "tolerance_mm": limit_m * 1000}
-        return self.finding(check, message, *blocks, **about)
+def _fault(
+    message: str, *blocks: int, field: str = "", found: object = "", allowed: str = ""
+) -> Finding:
+    return Finding("", message, field, str(found), allowed, blocks=blocks)
 
 
 def _size(facts: SceneFacts) -> Iterator[Finding]:
@@ -127,32 +106,31 @@ def _size(facts: SceneFacts) -> Iterator[Finding]:
     for level in facts.scene.levels:
         least, most, most_layers = LEVEL_LIMITS[level]
         if not least <= count <= most:
-            about = {"found": str(count), "allowed": f"{least} to {most} at level {level}"}
-            yield facts.finding("size", "wrong size", field="blocks", **about)
+            allowed = f"{least} to {most} at level {level}"
+            yield _fault("wrong size", field="blocks", found=count, allowed=allowed)
         if layers > most_layers:
-            about = {"found": str(layers), "allowed": f"at most {most_layers} at level {level}"}
-            yield facts.finding("size", "too high", field="layers", **about)
+            allowed = f"at most {most_layers} at level {level}"
+            yield _fault("too high", field="layers", found=layers, allowed=allowed)
 
 
 def _palette(facts: SceneFacts) -> Iterator[Finding]:
     """Blocks whose pair of type and color is not in the palette."""
     for i, block in enumerate(facts.scene.blocks):
         if block.kind not in facts.palette:
-            about = {"field": f"blocks[{i}]", "found": " ".join(block.kind)}
-            yield facts.finding("palette", "not in the palette", block.order, **about)
+            kind = " ".join(block.kind)
+            yield _fault("not in the palette", block.order, field=f"blocks[{i}]", found=kind)
 
 
 def _layer(facts: SceneFacts) -> Iterator[Finding]:
     """Layers that are not the longest path of the declared dependencies."""
-    for i, (block, layer) in enumerate(
-        zip(facts.scene.blocks, facts.scene.graph.layers, strict=True)
-    ):
+    both = zip(facts.scene.blocks, facts.scene.graph.layers, strict=True)
+    for i, (block, layer) in enumerate(both):
         if block.layer != layer:
             message = (
                 f"block {block.order} is on layer {block.layer}, but on {layer} by the longest "
                 "path of dependencies"
             )
-            yield facts.finding("layer", message, block.order, field=f"blocks[{i}].layer")
+            yield _fault(message, block.order, field=f"blocks[{i}].layer")
 
 
 def _order(facts: SceneFacts) -> Iterator[Finding]:
@@ -162,7 +140,7 @@ def _order(facts: SceneFacts) -> Iterator[Finding]:
         if early := sorted(set(block.depend) - placed):
             supports = ", ".join(map(_name, early))
             message = f"the stored order puts block {block.order} before its support, {supports}"
-            yield facts.finding("order", message, block.order, *early, field="blocks")
+            yield _fault(message, block.order, *early, field="blocks")
         placed.add(block.order)
 
 
@@ -170,43 +148,39 @@ def _hidden(facts: SceneFacts) -> Iterator[Finding]:
     """Blocks too little of which is visible in the goal picture, by area or outline."""
     hidden = hidden_blocks(facts.scene)
     for order in hidden:
-        yield facts.finding("hidden", f"block {order} does not show in the goal picture", order)
+        yield _fault(f"block {order} does not show in the goal picture", order)
     for order, share in visible_shares(facts.scene, PictureStyle(size_px=256)).items():
         if share < LEAST_SHOWN and order not in hidden:
             message = f"only {share:.1%} of the outline of block {order} shows in the goal picture"
-            yield facts.finding("hidden", message, order, allowed=f"at least {LEAST_SHOWN:.0%}")
+            yield _fault(message, order, allowed=f"at least {LEAST_SHOWN:.0%}")
 
 
 def _overlap(facts: SceneFacts) -> Iterator[Finding]:
     """Blocks that share space, with one another or with the ground."""
-    limit_m = facts.tolerances.fit_m
-    for one in find_overlaps(facts.scene.blocks, limit_m):
+    for one in find_overlaps(facts.scene.blocks, facts.tolerances.fit_m):
         message = f"block {one.second} overlaps {_name(one.first)} by {one.depth_m * 1000:.2f} mm"
-        about = (one.first, one.second)
-        yield facts.measured("overlap", message, *about, value_m=one.depth_m, limit_m=limit_m)
+        yield _fault(message, one.first, one.second)
 
 
 def _floating(facts: SceneFacts) -> Iterator[Finding]:
     """Blocks that hang above what is below them."""
-    limit_m = facts.tolerances.fit_m
-    for gap in find_gaps(facts.scene.blocks, limit_m):
+    for gap in find_gaps(facts.scene.blocks, facts.tolerances.fit_m):
         message = f"block {gap.order} floats {gap.height_m * 1000:.2f} mm above its support"
-        about = {"value_m": gap.height_m, "limit_m": limit_m}
-        yield facts.measured("floating", message, gap.order, **about)
+        yield _fault(message, gap.order)
 
 
-def _dependencies(facts: SceneFacts, check: str) -> Iterator[Finding]:
-    """Supporting contacts that are not declared, or declared dependencies without contact."""
-    is_undeclared = check == "undeclared dependency"
+def _dependencies(facts: SceneFacts, is_declared: bool) -> Iterator[Finding]:
+    """Declared dependencies without contact, or supporting contacts that are not declared."""
     for i, block in enumerate(facts.scene.blocks):
         order, declared = block.order, frozenset(block.depend or {GROUND})
         contacts = facts.contacts[order]
-        for other in sorted(contacts - declared if is_undeclared else declared - contacts):
-            message = f"block {order} does not rest on {_name(other)}, which is declared"
-            if is_undeclared:
-                message = f"block {order} rests on {_name(other)}, which is not declared"
-            about = {"found": str(sorted(declared)), "allowed": str(sorted(contacts))}
-            yield facts.finding(check, message, order, other, field=f"blocks[{i}].depend", **about)
+        for other in sorted(declared - contacts if is_declared else contacts - declared):
+            message = f"block {order} rests on {_name(other)}, which is not declared"
+            if is_declared:
+                message = f"block {order} does not rest on {_name(other)}, which is declared"
+            found, allowed = sorted(declared), str(sorted(contacts))
+            field = f"blocks[{i}].depend"
+            yield _fault(message, order, other, field=field, found=found, allowed=allowed)
 
 
 def _unstable_step(facts: SceneFacts) -> Iterator[Finding]:
@@ -216,34 +190,35 @@ def _unstable_step(facts: SceneFacts) -> Iterator[Finding]:
     for count, step in enumerate(check_steps(blocks[:-1], first), 1):
         if not step.stable:
             when = f"at step {count}, once block {blocks[count - 1].order} is placed"
-            yield _fall(facts, "unstable step", when, step)
+            yield _fall(step, when, trial)
 
 
 def _unstable(facts: SceneFacts) -> Iterator[Finding]:
     """Blocks that fall from the finished structure."""
-    whole = check(facts.scene.blocks, facts.tolerances.trial, facts.tolerances.quiet_s)
+    trial = facts.tolerances.trial
+    whole = check(facts.scene.blocks, trial, facts.tolerances.quiet_s)
     if not whole.stable:
         differing = "" if whole.agreed else ", not the same ones at every time step"
-        yield _fall(facts, "unstable", f"when all is built{differing}", whole)
+        yield _fall(whole, f"when all is built{differing}", trial)
 
 
-def _fall(facts: SceneFacts, check: str, when: str, shown: Stability) -> Finding:
+def _fall(shown: Stability, when: str, trial: Trial) -> Finding:
     named = ", ".join(map(str, shown.fallen))
     falling = f"blocks {named} fall" if len(shown.fallen) > 1 else f"block {named} falls"
-    about = {"value_m": shown.moved_m, "limit_m": facts.tolerances.trial.limit_m}
-    return facts.measured(check, f"{falling} {when}", *shown.fallen, **about)
+    moved, limit = f"moved {shown.moved_m * 1000:.0f} mm", f"{trial.limit_m * 1000:g} mm"
+    return _fault(f"{falling} {when}", *shown.fallen, found=moved, allowed=limit)
 
 
 def _candidates(facts: SceneFacts) -> Iterator[Finding]:
     """Too many candidates, and blocks without a candidate."""
     if facts.candidates is None:
         return
-    if len(facts.candidates) > MAX_CANDIDATES:
-        about = {"found": str(len(facts.candidates)), "allowed": f"at most {MAX_CANDIDATES}"}
-        yield facts.finding("candidates", "too many candidates", field="candidates", **about)
+    if (count := len(facts.candidates)) > MAX_CANDIDATES:
+        allowed = f"at most {MAX_CANDIDATES}"
+        yield _fault("too many candidates", field="candidates", found=count, allowed=allowed)
     for order in facts.candidates.missing(facts.scene):
         message = f"the candidates hold nothing that block {order} needs"
-        yield facts.finding("candidates", message, order, field="candidates")
+        yield _fault(message, order, field="candidates")
 
 
 def _distractor(facts: SceneFacts) -> Iterator[Finding]:
@@ -253,7 +228,7 @@ def _distractor(facts: SceneFacts) -> Iterator[Finding]:
         poses = {orientation_class(one.type, euler) for euler in POSES[one.type].values()}
         if one.look not in needed and one.look[2] not in poses:
             message = f"candidate {i + 1} is not needed and stands as no block of a goal does"
-            yield facts.finding("distractor", message, field=f"candidates[{i}]", found=str(one))
+            yield _fault(message, field=f"candidates[{i}]", found=one)
 
 
 def _name(order: int) -> str:
@@ -268,8 +243,8 @@ CHECKS: dict[str, Callable[[SceneFacts], Iterable[Finding]]] = {
     "hidden": _hidden,
     "overlap": _overlap,
     "floating": _floating,
-    "undeclared dependency": partial(_dependencies, check="undeclared dependency"),
-    "dependency without contact": partial(_dependencies, check="dependency without contact"),
+    "undeclared dependency": partial(_dependencies, is_declared=False),
+    "dependency without contact": partial(_dependencies, is_declared=True),
     "unstable step": _unstable_step,
     "unstable": _unstable,
     "candidates": _candidates,
@@ -292,7 +267,8 @@ def findings_of(facts: SceneFacts, names: Iterable[str]) -> Iterator[Finding]:
     Raises SimulationError as the simulator does.
     """
     for name in names:
-        yield from CHECKS[name](facts)
+        for found in CHECKS[name](facts):
+            yield replace(found, where=facts.scene.id, check=name)
 
 
 def is_acceptable(scene: Scene, palette: tuple[Kind, ...]) -> bool:
@@ -332,9 +308,9 @@ def check_set(scenes: Sequence[Scene]) -> tuple[Finding, ...]:
     for scene in scenes:
         if (twin := first.setdefault(fingerprint(scene.blocks), scene.id)) != scene.id:
             message = f"is scene {twin}, turned, mirrored or shifted at most"
-            found.append(Finding(scene.id, "duplicate", message))
+            found.append(Finding(scene.id, message, check="duplicate"))
         strange = [parent for parent in scene.parents if parent not in bases]
         if strange or not scene.parents:
             message = "name no base scene of the set"
-            found.append(Finding(scene.id, "parents", message, (), "parents", str(strange)))
+            found.append(Finding(scene.id, message, "parents", str(strange), check="parents"))
     return tuple(found)

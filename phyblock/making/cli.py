@@ -82,22 +82,16 @@ def questions() -> None:
 # Options and steps that commands share
 
 
-class _Several(click.ParamType[tuple[str, ...]]):
-    """A comma-separated list of known words, each once, or `all`."""
+def _several(known: Sequence[str]) -> Callable[..., tuple[str, ...]]:
+    """Return a callback that reads a comma-separated list of known words, each once, or `all`."""
 
-    name = "words"
-
-    def __init__(self, known: Sequence[str]) -> None:
-        self._known = known
-
-    def convert(
-        self, value: str, param: click.Parameter | None, ctx: click.Context | None
-    ) -> tuple[str, ...]:
-        """Return the words in the order given."""
-        words = tuple(self._known) if value == "all" else tuple(value.upper().split(","))
-        if not set(self._known).issuperset(words) or len(set(words)) < len(words):
-            self.fail(f"{value!r}: give all, or some of {','.join(self._known)}", param, ctx)
+    def read(_: click.Context, __: click.Parameter, value: str) -> tuple[str, ...]:
+        words = tuple(known) if value == "all" else tuple(value.upper().split(","))
+        if not set(known).issuperset(words) or len(set(words)) < len(words):
+            raise click.BadParameter(f"{value!r}: give all, or some of {','.join(known)}")
         return words
+
+    return read
 
 
 _out = click.option(
@@ -158,7 +152,11 @@ def _conclude(name: str, problems: Iterable[Problem | str]) -> None:
 @scenes.command("generate")
 @click.option("--count", type=click.IntRange(1), default=400, show_default=True, metavar="N")
 @click.option(
-    "--levels", type=_Several(("1", "2", "3", "4", "5+")), default="1,2,3,4", show_default=True
+    "--levels",
+    callback=_several(("1", "2", "3", "4", "5+")),
+    default="1,2,3,4",
+    show_default=True,
+    metavar="WORDS",
 )
 @click.option(
     "--palette",
@@ -323,7 +321,7 @@ def complete_set(data: Path, jobs: int, out: Path | None) -> None:
         for note in one.notes:
             click.echo(f"note: scene {one.scene.id}: {note}")
     for finding in checks.check_set(made):
-        click.echo(f"note: scene {finding.scene}: {finding.field} {finding.message}")
+        click.echo(f"note: scene {finding.where}: {finding.field} {finding.message}")
     click.echo(f"{counted(len(tasks), 'scene')} completed: {shown_path(folder)}")
     here = str(folder) if folder.is_absolute() else f"./{folder}"
     click.echo(f"Next: phyblock run quick --set dataset.path={shlex.quote(here)}")
@@ -351,14 +349,14 @@ def verify_scenes(data: str, jobs: int) -> None:
         names, work = (*checks.FOREIGN_CHECKS, "duplicate"), checks.verify_foreign
     found = [one for one in checks.check_set([scene for scene, _ in tasks]) if one.check in names]
     found += chain.from_iterable(_mapped(work, tasks, jobs, "Verifying"))
-    failed = Counter(check for _, check in {(one.scene, one.check) for one in found})
+    failed = Counter(check for _, check in {(one.where, one.check) for one in found})
     rows = [(check, str(len(tasks) - failed[check]), str(len(tasks))) for check in names]
     summed, changed = (0, ()) if is_official else files.check_sums(where)
     if summed:
         rows.append(("checksums", str(summed - len(changed)), str(summed)))
-    rows.append(("all", str(len(tasks) - len({one.scene for one in found})), str(len(tasks))))
+    rows.append(("all", str(len(tasks) - len({one.where for one in found})), str(len(tasks))))
     print_rows(make_console(), ("check", "passed", "of"), rows, numbers=2)
-    _conclude(data, (*(finding.problem for finding in found), *changed))
+    _conclude(data, (*found, *changed))
 
 
 @scenes.command("show")
@@ -373,6 +371,10 @@ def show_scene(data: str, scene: str) -> None:
     task = read_data_set(data).task(scene)
     shown, offered = task.scene, task.candidates
     console = make_console()
+
+    def joined(numbers: Iterable[float]) -> str:
+        return " ".join(f"{number:g}" for number in numbers)
+
     levels, parents = " and ".join(map(str, shown.levels)), ", ".join(shown.parents)
     size = f"{counted(len(shown), 'block')} · {counted(max(shown.graph.layers), 'layer')}"
     heading = f"scene {shown.id} · level {levels} · {size} · made from {parents}"
@@ -384,8 +386,8 @@ def show_scene(data: str, scene: str) -> None:
         (
             *(str(block.order), block.type, block.color),
             " ".join(map(str, sorted(block.depend))) or "ground",
-            " ".join(f"{round(1000 * c, 1) + 0.0:g}" for c in block.position_m),
-            " ".join(f"{angle:g}" for angle in block.euler_deg),
+            joined(round(1000 * c, 1) + 0.0 for c in block.position_m),
+            joined(block.euler_deg),
             *(str(block.layer), str(offered.index_of(block.look)), f"{seen[block.order]:.0%}"),
         )
         for block in shown.blocks
@@ -394,12 +396,8 @@ def show_scene(data: str, scene: str) -> None:
     print_rows(console, columns, blocks, numbers=3)
     looks = Counter(block.look for block in shown.blocks)
     candidates = [
-        (
-            *(str(number), one.type, one.color),
-            " ".join(f"{angle:g}" for angle in one.euler_deg),
-            str(looks[one.look] or ""),
-        )
-        for number, one in enumerate(offered.candidates, 1)
+        (str(n), one.type, one.color, joined(one.euler_deg), str(looks[one.look] or ""))
+        for n, one in enumerate(offered.candidates, 1)
     ]
     columns = ["candidate", "type", "color", "euler deg", "needed"]
     print_rows(console, columns, candidates, numbers=1)
@@ -492,7 +490,9 @@ def _read(path: str, data: str) -> QuestionSet:
 
 @questions.command("generate")
 @_data
-@click.option("--subtasks", type=_Several(SUBTASKS), default="all", show_default=True)
+@click.option(
+    "--subtasks", callback=_several(SUBTASKS), default="all", show_default=True, metavar="WORDS"
+)
 @click.option(
     "--per-subtask",
     type=click.IntRange(1),

@@ -291,11 +291,10 @@ def _by_colors(
     measures = np.array([_looks_of_lot(plain, order, lot) for lot in lots])
     four = base.four_alike(measures, unlike, sight.LEAST_PIXELS, rng)
     colors = pick(rng, _COLORS)
-    options = []
-    for lot in (lots[place] for place in four):
-        color = {b.order: colors[b.order not in lot] for b in plain.blocks} | {order: colors[2]}
-        blocks = tuple(replace(block, color=color[block.order]) for block in plain.blocks)
-        options.append(replace(plain, blocks=blocks))
+    options = [
+        replace(one, blocks=sight.colored(one.blocks, {order: colors[2]}))
+        for one in (sight.with_lot(plain, lots[place], colors) for place in four)
+    ]
     return (colors, tuple(options)) if options and sight.are_told_apart(options) else None
 
 

@@ -99,19 +99,18 @@ def make_questions(
 
 
 def scene_drafts(task: tuple[Subtask, int, Scene]) -> list[Draft]:
-    """Return the drafts of a subtask, by a seed, about a scene; they depend on nothing else."""
+    """Return the drafts of a subtask, by a seed, about a scene; they depend on nothing else.
+
+    They have measures of their pictures, by which the one right option might stand out.
+    """
     subtask, seed, scene = task
-    maker = MAKERS[subtask]
-    drafts = islice(maker.drafts(scene, _rng(seed, subtask, scene.id)), maker.drafts_a_scene)
-    return [replace(one, looks=_looks(subtask, one)) for one in drafts]
-
-
-def _looks(subtask: Subtask, draft: Draft) -> tuple[tuple[float, ...], ...]:
-    """Return measures of a draft's pictures, by which the one right option might stand out."""
-    if subtask == "OR":
-        return ()
-    measures = measures_of(as_question("", subtask, draft, _PLACES, BACKGROUNDS[0]))
-    return tuple(map(tuple, measures.tolist()))
+    maker, drafts = MAKERS[subtask], list[Draft]()
+    for one in islice(maker.drafts(scene, _rng(seed, subtask, scene.id)), maker.drafts_a_scene):
+        if subtask != "OR":
+            measures = measures_of(as_question("", subtask, one, _PLACES, BACKGROUNDS[0]))
+            one = replace(one, looks=tuple(map(tuple, measures.tolist())))
+        drafts.append(one)
+    return drafts
 
 
 def _rng(seed: int, *parts: str) -> np.random.Generator:

@@ -11,6 +11,7 @@ import itertools
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from operator import sub
 
 import numpy as np
 
@@ -44,7 +45,7 @@ class ShapeMaker(StaticMaker):
         for order in base.shuffled(rng, sight.orders_of(scene.blocks)):
             shown = sight.recolored(scene, rng)
             picture = sight.goal_picture(shown, view)
-            block = next(b for b in shown.blocks if b.order == order)
+            block = sight.block_of(shown.blocks, order)
             if name := sight.drawn_name(rng, block, picture, _UNSAID["SH"]):
                 word, slots = sight.shape_word(block.type), {"block": name}
                 others = base.shuffled(rng, [one for one in sight.SHAPE_WORDS if one != word])
@@ -104,22 +105,17 @@ class ColorMaker(StaticMaker):
         return [right, *others[:3]] if len(pairs) == 6 and right in pairs else ()
 
 
-def _length_m(block: Block) -> float:
-    """Return the longest side of the box that a block fits in, however it lies [m]."""
-    shape = SHAPES[block.type]
-    return max(high - low for low, high in zip(shape.low_m, shape.high_m, strict=True))
-
-
-def _volume_m3(block: Block) -> float:
-    return SHAPES[block.type].volume_m3
-
-
 _COMPARISONS: Mapping[str, tuple[str, Callable[[Block], float], int]] = {
     "tallest": ("si-height", sight.height_m, 1),
     "shortest": ("si-height", sight.height_m, -1),
-    "longest": ("si-length", _length_m, 1),
-    "the most space": ("si-volume", _volume_m3, 1),
-    "the least space": ("si-volume", _volume_m3, -1),
+    "longest": (
+        "si-length",
+        # The longest side of the box that a block fits in, however it lies.
+        lambda block: max(map(sub, SHAPES[block.type].high_m, SHAPES[block.type].low_m)),
+        1,
+    ),
+    "the most space": ("si-volume", lambda block: SHAPES[block.type].volume_m3, 1),
+    "the least space": ("si-volume", lambda block: SHAPES[block.type].volume_m3, -1),
 }
 """Stems of wordings, measures, and whether most or least of them is asked for."""
 _LEAST_RATIO, _EXACT, _TRIES = 1.3, 0.01, 6
@@ -137,13 +133,12 @@ class SizeMaker(StaticMaker):
         for number in range(2 * _TRIES if len(studied) > 1 else 0):
             is_choice = number % 2 == 0
             chosen = sight.orders_of(base.shuffled(rng, studied)[: 4 if is_choice else 2])
-            shown = (
-                sight.recolored(scene, rng)
-                if is_choice
-                else sight.with_own_colors(scene, chosen, rng)
-            )
+            if is_choice:
+                shown = sight.recolored(scene, rng)
+            else:
+                shown = sight.with_own_colors(scene, chosen, rng)
             picture = sight.goal_picture(shown, view)
-            blocks = [next(b for b in shown.blocks if b.order == order) for order in chosen]
+            blocks = [sight.block_of(shown.blocks, order) for order in chosen]
             named = [sight.drawn_name(rng, block, picture, _UNSAID["SI"]) for block in blocks]
             if any(name is None or "highest" in name for name in named):
                 continue
@@ -205,20 +200,22 @@ def layers_of(blocks: Sequence[Block]) -> Mapping[int, int]:
         order: {other for other in others if bottom[order] > top[other] - _WEDGED_M} or {GROUND}
         for order, others in below.items()
     }
-    counted = _longest(below)
-    if counted != _longest(plain):
+
+    def longest(under: Mapping[int, Collection[int]]) -> dict[int, int]:
+        layer = {GROUND: 0}
+        while len(layer) <= len(under):
+            ready = [
+                o for o in under if o not in layer and under[o] and layer.keys() >= set(under[o])
+            ]
+            if not ready:
+                raise UnfairError("some block rests on nothing, or on itself")
+            layer.update({o: 1 + max(layer[other] for other in under[o]) for o in ready})
+        return {order: number for order, number in layer.items() if order != GROUND}
+
+    counted = longest(below)
+    if counted != longest(plain):
         raise UnfairError("some block rests on others and stands lower than they reach")
     return counted
-
-
-def _longest(below: Mapping[int, Collection[int]]) -> dict[int, int]:
-    layer = {GROUND: 0}
-    while len(layer) <= len(below):
-        ready = [o for o in below if o not in layer and below[o] and set(below[o]) <= layer.keys()]
-        if not ready:
-            raise UnfairError("some block rests on nothing, or on itself")
-        layer.update({order: 1 + max(layer[other] for other in below[order]) for order in ready})
-    return {order: number for order, number in layer.items() if order != GROUND}
 
 
 def sure_blocks(picture: QuestionPicture) -> int:
@@ -261,27 +258,11 @@ def _types(blocks: Sequence[Block]) -> Counter[str]:
     return Counter(block.type for block in blocks)
 
 
-def _fitting(picture: QuestionPicture, slots: Slots) -> int:
-    """Count the blocks that `red blocks`, `cubes` or `red cubes` speaks of."""
-    first, _, rest = slots["what"].partition(" ")
-    color, noun = (first, rest) if first in COLORS else ("", slots["what"])
-    if noun not in (*_TYPES_OF, "blocks"):
-        raise UnfairError(f"{slots['what']!r} cannot be counted")
-    # Colors can be counted where shapes cannot.
-    blocks = _all(picture) if noun == "blocks" else _shaped(picture)
-    types = _TYPES_OF.get(noun, BLOCK_TYPES)
-    return sum(color in ("", block.color) and block.type in types for block in blocks)
-
-
 def _layer_of_block(picture: QuestionPicture, slots: Slots) -> int:
     block = sight.resolve_one(slots["block"], picture)
     sight.require_seen(picture, sight.NAMED, [block])
     sight.require_supports_seen(picture, [block])
     return layers_of(picture.blocks)[block.order]
-
-
-def _colors(picture: QuestionPicture) -> list[str]:
-    return sorted({block.color for block in picture.blocks})
 
 
 def _layer_numbers(picture: QuestionPicture) -> list[Slots]:
@@ -396,9 +377,7 @@ class NumberMaker(StaticMaker):
                 ours = dict.fromkeys(base.shuffled(rng, mine)[: pick(rng, four)], color)
                 other = {order: pick(rng, others) for order in mine}
                 drawn = {b.order: pick(rng, (color, *others)) for b in scene.blocks} | other | ours
-                shown = replace(
-                    scene, blocks=tuple(replace(b, color=drawn[b.order]) for b in scene.blocks)
-                )
+                shown = replace(scene, blocks=sight.colored(scene.blocks, drawn))
                 what, options = f"{color} {noun}", list(map(str, four))
             else:
                 continue
@@ -407,5 +386,13 @@ class NumberMaker(StaticMaker):
                 yield Asked("nu", shown, picture, {"what": what}, options, kind)
 
     def right(self, asked: Asked) -> str:
-        """Count again."""
-        return str(_fitting(asked.picture, asked.slots))
+        """Count the blocks that `red blocks`, `cubes` or `red cubes` speaks of."""
+        what, picture = asked.slots["what"], asked.picture
+        first, _, rest = what.partition(" ")
+        color, noun = (first, rest) if first in COLORS else ("", what)
+        if noun not in (*_TYPES_OF, "blocks"):
+            raise UnfairError(f"{what!r} cannot be counted")
+        # Colors can be counted where shapes cannot.
+        blocks = _all(picture) if noun == "blocks" else _shaped(picture)
+        types = _TYPES_OF.get(noun, BLOCK_TYPES)
+        return str(sum(color in ("", block.color) and block.type in types for block in blocks))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import functools
 import itertools
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -96,8 +96,8 @@ class PositionMaker(StaticMaker):
         """Compare the places of the blocks that the text or the options name."""
         if asked.stem in _PLACES:
             one, other = _resolved(asked.picture, (asked.slots["block"], asked.slots["other"]))
-            rule = _corner if asked.stem == "rp-corner" else _upright
-            return _PLACES[asked.stem][rule(one, other, asked.picture.view_deg)]
+            place = _place(asked.stem, one, other, asked.picture.view_deg)
+            return _PLACES[asked.stem][place]
         four = _resolved(asked.picture, asked.options)
         if asked.stem == "rp-extreme":
             extreme = asked.slots["extreme"]
@@ -130,24 +130,17 @@ def _floor_axes(view: View) -> tuple[Floats, Floats]:
     return right, away / np.linalg.norm(away)
 
 
-def _offset_m(block: Block, other: Block, view: View) -> tuple[float, float]:
-    """Return the way from `other` to `block`: to the right of the picture, and away [m]."""
-    step = sight.center_m(block) - sight.center_m(other)
+def _place(stem: str, one: Block, other: Block, view: View) -> int:
+    """Return which of the places of a wording `one` is at, as the viewer sees it from `other`.
+
+    UnfairError for all between these places.
+    """
+    step = sight.center_m(one) - sight.center_m(other)
     across, away = (float(step @ axis) for axis in _floor_axes(view))
-    return across, away
-
-
-def _corner(one: Block, other: Block, view: View) -> int:
-    """Return the quarter of the floor round `other` that holds `one`, as the viewer sees it."""
-    across, away = _offset_m(one, other, view)
-    if min(abs(across), abs(away)) < _CLEAR_M:
-        raise UnfairError("is neither clearly to a side nor clearly in front or behind")
-    return int(2 * (away > 0) + (across > 0))
-
-
-def _upright(one: Block, other: Block, view: View) -> int:
-    """Return over or under it, or beside it at its height; UnfairError for all between."""
-    across, away = _offset_m(one, other, view)
+    if stem == "rp-corner":
+        if min(abs(across), abs(away)) < _CLEAR_M:
+            raise UnfairError("is neither clearly to a side nor clearly in front or behind")
+        return int(2 * (away > 0) + (across > 0))
     low, high = bounds_m(one)[:, 2] - bounds_m(other)[::-1, 2]
     if max(abs(across), abs(away)) < _ABOVE_M and (low > -_LEVEL_M or high < _LEVEL_M):
         return int(low <= -_LEVEL_M)
@@ -159,25 +152,25 @@ def _upright(one: Block, other: Block, view: View) -> int:
 
 # AP
 
-_SIDE_M, _EXACT_CM, _LONGER = 0.001, 0.1, 1.3
+_SIDE_M, _EXACT_CM = 0.001, 0.1
 _SCALES: Sequence[BlockType] = ("cube", "cylinder", "arch")
 """Types whose size the prompt says; one of them is to be seen."""
 _STEP_CM = 2.5
-
-
-def grid_cm(length_m: float) -> float:
-    """Return the length in centimeters where it is a multiple of 2.5 cm; else UnfairError."""
-    steps = round(length_m * 100 / _STEP_CM)
-    if abs(length_m * 100 - _STEP_CM * steps) > _EXACT_CM:
-        raise UnfairError(f"{length_m * 100:.1f} cm is no multiple of 2.5 cm")
-    return _STEP_CM * steps
 
 
 def _apart(one: Block, other: Block, blocks: Sequence[Block]) -> float:
     x, y, _ = np.abs(sight.center_m(one) - sight.center_m(other)).tolist()
     if min(x, y) > _SIDE_M:
         raise UnfairError("the blocks stand askew, so that their distance cannot be counted")
-    _require_joined(one, other, blocks)
+    # The two belong to one structure, by what rests on what.
+    reached: set[int] = set()
+    found = {one.order}
+    while found:
+        reached |= found
+        over = {b.order for b in blocks if found.intersection(b.depend)}
+        found = over.union(*(b.depend for b in blocks if b.order in found)) - reached
+    if other.order not in reached:
+        raise UnfairError("the blocks are parts of structures that stand apart")
     return float(max(x, y))
 
 
@@ -195,30 +188,6 @@ _LADDERS_CM = (
     *((12.5, 15, 20, 25), (15, 20, 25, 30)),
 )
 """Lengths that are options together: few fours, so that of each any length is as often right."""
-
-
-def _require_joined(one: Block, other: Block, blocks: Sequence[Block]) -> None:
-    """Raise UnfairError unless the two belong to one structure, by what rests on what."""
-    reached: set[int] = set()
-    found = {one.order}
-    while found:
-        reached |= found
-        over = {b.order for b in blocks if found.intersection(b.depend)}
-        found = over.union(*(b.depend for b in blocks if b.order in found)) - reached
-    if other.order not in reached:
-        raise UnfairError("the blocks are parts of structures that stand apart")
-
-
-def length_axis(block: Block) -> int:
-    """Return the level axis of the world (0 or 1) that a block's longest side runs along.
-
-    UnfairError where it stands on end, stands askew, or no side is clearly the longest.
-    """
-    sides = np.diff(bounds_m(block), axis=0)[0]
-    first, second = sorted(range(3), key=lambda axis: -sides[axis])[:2]
-    if first == 2 or sides[first] < _LONGER * sides[second] or block.euler_deg[2] % 90:
-        raise UnfairError("has no length that lies along the ground")
-    return first
 
 
 class DistanceMaker(StaticMaker):
@@ -248,7 +217,11 @@ class DistanceMaker(StaticMaker):
         sight.require_supports_seen(picture, blocks)
         if not any(one.type in _SCALES for one in sight.seen_blocks(picture, sight.NAMED)):
             raise UnfairError("no block that gives the scale can be seen")
-        return f"{grid_cm(LENGTHS[asked.stem](blocks[0], blocks[-1], asked.picture.blocks)):g} cm"
+        length_cm = 100 * LENGTHS[asked.stem](blocks[0], blocks[-1], asked.picture.blocks)
+        on_grid_cm = _STEP_CM * round(length_cm / _STEP_CM)
+        if abs(length_cm - on_grid_cm) > _EXACT_CM:
+            raise UnfairError(f"{length_cm:.1f} cm is no multiple of 2.5 cm")
+        return f"{on_grid_cm:g} cm"
 
     def offer(self, asked: Asked, right: str, rng: np.random.Generator) -> Sequence[str]:
         """Return four lengths that may stand together."""
@@ -298,7 +271,7 @@ class DependencyMaker(StaticMaker):
 
 # RR
 
-_STEP_DEG = 15
+_STEP_DEG, _LONGER = 15, 1.3
 AXIS_TURNS: tuple[str, ...] = tuple(base.WORDS["turns_about_axes"])
 """Turns of a block that lies along the ground; the side does not matter."""
 _OFFERED: Mapping[str, Sequence[str]] = {
@@ -308,21 +281,20 @@ _OFFERED: Mapping[str, Sequence[str]] = {
     ),
     "rr-axis": AXIS_TURNS,
 }
-_OWN = {"rr-angle": (0, 180), "rr-turn": (0,)}
-"""Turns about the vertical that map the blocks to themselves of which a question is asked."""
-_KINDS = {"rr-angle": "vertical", "rr-turn": "vertical", "rr-axis": "axis"}
 _SAME_ANGLE, _FREE_M, _ASIDE_M = 1e-4, 0.02, 0.01
 _COMPARED, _BESIDE = 6, 3
 
 
-def _about(axis: int, angle_deg: float) -> Floats:
-    """Return the rotation matrix (3, 3) about an axis of the world."""
-    cosine, sine = math.cos(math.radians(angle_deg)), math.sin(math.radians(angle_deg))
-    one, two = (axis + 1) % 3, (axis + 2) % 3
-    matrix = np.eye(3)
-    matrix[one, one] = matrix[two, two] = cosine
-    matrix[two, one], matrix[one, two] = sine, -sine
-    return matrix
+def length_axis(block: Block) -> int:
+    """Return the level axis of the world (0 or 1) that a block's longest side runs along.
+
+    UnfairError where it stands on end, stands askew, or no side is clearly the longest.
+    """
+    sides = np.diff(bounds_m(block), axis=0)[0]
+    first, second = sorted(range(3), key=lambda axis: -sides[axis])[:2]
+    if first == 2 or sides[first] < _LONGER * sides[second] or block.euler_deg[2] % 90:
+        raise UnfairError("has no length that lies along the ground")
+    return first
 
 
 @functools.lru_cache(maxsize=4096)
@@ -332,71 +304,52 @@ def _is_alike(block_type: BlockType, one_deg: Euler, other_deg: Euler) -> bool:
     return bool(np.abs(np.array(one) - np.array(other)).max() < _SAME_ANGLE)
 
 
-def axis_turns(block: Block, other: Block) -> tuple[str, ...]:
-    """Return those of `AXIS_TURNS` that take `other` to how `block` is oriented, up to symmetry.
-
-    None when they are of different types; UnfairError where `other` has no length that lies
-    along the ground.
+def images(stem: str, block: Block) -> Sequence[tuple[str, Euler]]:
+    """Return what can be said of turns that a wording is about, each with the orientation to which
+    it takes the block. UnfairError for a block that has no length to turn about.
     """
-    if block.type != other.type or not SHAPES[block.type].is_long:
-        return ()
-    images = _images(other.euler_deg, length_axis(other))
-    fitting = (name for name, deg in images if _is_alike(block.type, block.euler_deg, deg))
-    return tuple(dict.fromkeys(fitting))
-
-
-def tipped_over(block: Block) -> tuple[Block, ...]:
-    """Return the block after each of `AXIS_TURNS`, to either side; UnfairError as `axis_turns`."""
-    angles = dict.fromkeys(angle for _, angle in _images(block.euler_deg, length_axis(block)))
-    return tuple(replace(block, euler_deg=angle) for angle in angles)
-
-
-def _turned(stem: str, block: Block) -> tuple[Block, ...]:
-    """Return the block in orientations that questions of a stem may be about."""
     if stem == "rr-axis":
-        return tipped_over(block)
-    turns = range(0, 360, _STEP_DEG)
-    return tuple(replace(block, euler_deg=_yawed(block.euler_deg, turn)) for turn in turns)
+        return _tipped(block.euler_deg, length_axis(block))
+    roll, pitch, yaw = block.euler_deg
+    found = []
+    for turn in range(0, 360, _STEP_DEG):
+        side = "" if turn in (0, 180) else " counterclockwise" if turn < 180 else " clockwise"
+        said = f"{min(turn, 360 - turn)} degrees{side if stem == 'rr-turn' else ''}"
+        found.append((said, (roll, pitch, round((yaw + turn) % 360, 6))))
+    return found
 
 
 @functools.lru_cache(maxsize=4096)
-def _images(euler_deg: Euler, along: int) -> Sequence[tuple[str, Euler]]:
-    """Return each turn, to either side, with the orientation that it gives."""
+def _tipped(euler_deg: Euler, along: int) -> Sequence[tuple[str, Euler]]:
+    """Return each turn about an axis, to either side, with the orientation that it gives."""
     rotation = euler_deg_to_matrix(euler_deg)
-    images = [(AXIS_TURNS[0], euler_deg)]
+    found = [(AXIS_TURNS[0], euler_deg)]
     for name, axis in zip(AXIS_TURNS[1:], (2, along, 1 - along), strict=True):
-        images += [(name, angles_deg(_about(axis, side) @ rotation)) for side in (90.0, -90.0)]
-    return images
+        one, two = (axis + 1) % 3, (axis + 2) % 3
+        for side in (1.0, -1.0):
+            turn = np.eye(3)
+            turn[one, one] = turn[two, two] = math.cos(math.radians(90.0))
+            turn[two, one], turn[one, two] = side, -side
+            found.append((name, angles_deg(turn @ rotation)))
+    return found
 
 
-def vertical_turns_deg(block: Block, other: Block) -> tuple[int, ...]:
-    """Return turns about the vertical, -165 to 180 degrees, that take `other` to how `block` lies.
+def phrases(stem: str, block: Block, other: Block) -> Collection[str]:
+    """Return what can be said truly of how a block is turned compared with another of its type.
 
-    In steps of 15 degrees, the least first, counterclockwise seen from above when positive; none
-    when the two are of different types, or one has to be tipped over as well.
+    Nothing, if it is not. UnfairError as `images`.
     """
-    if block.type != other.type:
+    if block.type != other.type or (stem == "rr-axis" and not SHAPES[block.type].is_long):
         return ()
-    turns = sorted(range(-180 + _STEP_DEG, 181, _STEP_DEG), key=lambda turn: (abs(turn), -turn))
     fits = functools.partial(_is_alike, block.type, block.euler_deg)
-    return tuple(turn for turn in turns if fits(_yawed(other.euler_deg, turn)))
-
-
-def _yawed(euler_deg: Euler, turn_deg: float) -> Euler:
-    roll, pitch, yaw = euler_deg
-    return roll, pitch, round((yaw + turn_deg) % 360, 6)
-
-
-def phrases(stem: str, block: Block, other: Block) -> tuple[str, ...]:
-    """Return what can be said truly of how a block is turned, the least turn first."""
-    if stem == "rr-axis":
-        return axis_turns(block, other)
-    if vertical_turns_deg(block, block) != _OWN.get(stem):
-        return ()
-    sides = {turn: "" if turn in (0, 180) else " clockwise" for turn in range(-180, 181)}
-    sides.update(dict.fromkeys(range(1, 180), " counterclockwise"))
-    turns = vertical_turns_deg(block, other)
-    return tuple(f"{abs(t)} degrees{sides[t] if stem == 'rr-turn' else ''}" for t in turns)
+    if stem != "rr-axis":
+        # A question of an angle is asked of blocks that half a turn maps to themselves, one of a
+        # turn of blocks that none does.
+        own = [fits(deg) for _, deg in images(stem, block)]
+        half = len(own) // 2
+        if own[half] is not (stem == "rr-angle") or sum(own) != 1 + own[half]:
+            return ()
+    return dict.fromkeys(said for said, deg in images(stem, other) if fits(deg))
 
 
 class RotationMaker(StaticMaker):
@@ -409,7 +362,8 @@ class RotationMaker(StaticMaker):
         studied = sight.seen_blocks(sight.goal_picture(scene, view), sight.STUDIED)
         for other, stem in itertools.product(base.shuffled(rng, studied)[:_COMPARED], _OFFERED):
             try:
-                turned = _turned(stem, other)
+                angles = dict.fromkeys(deg for _, deg in images(stem, other))
+                turned = [replace(other, euler_deg=deg) for deg in angles]
                 said = {one: set(phrases(stem, one, other)) & set(_OFFERED[stem]) for one in turned}
             except UnfairError:
                 continue
@@ -420,8 +374,20 @@ class RotationMaker(StaticMaker):
                 continue
             for _ in range(_BESIDE):
                 loose = put_beside(pick(rng, fitting), scene.blocks, rng)
-                if surely_stands((loose,)):
-                    yield _asked(stem, scene, view, loose, other, rng)
+                if not surely_stands((loose,)):
+                    continue
+                # Each of the two in a color of its own.
+                every = replace(scene, blocks=(*scene.blocks, loose))
+                shown = sight.with_own_colors(every, [loose.order, other.order], rng)
+                color = {block.order: block.color for block in shown.blocks}
+                mine, its = (
+                    f"{color[one.order]} {sight.shape_word(one.type)}" for one in (loose, other)
+                )
+                colored = replace(scene, blocks=shown.blocks[:-1])
+                picture = sight.goal_picture(shown, view)
+                kind = "axis" if stem == "rr-axis" else "vertical"
+                slots = {"block": mine, "other": its}
+                yield Asked(stem, colored, picture, slots, _OFFERED[stem], kind)
 
     def right(self, asked: Asked) -> str:
         """Compare the orientations in the picture, up to the symmetry of the type."""
@@ -431,19 +397,6 @@ class RotationMaker(StaticMaker):
         if len(true) != 1:
             raise UnfairError("are not of one type, or not turned as the wording asks")
         return true.pop()
-
-
-def _asked(
-    stem: str, scene: Scene, view: View, loose: Block, other: Block, rng: np.random.Generator
-) -> Asked:
-    """Ask about a loose block and another, each in a color of its own."""
-    every = replace(scene, blocks=(*scene.blocks, loose))
-    shown = sight.with_own_colors(every, [loose.order, other.order], rng)
-    color = {block.order: block.color for block in shown.blocks}
-    names = {one: f"{color[one.order]} {sight.shape_word(one.type)}" for one in (loose, other)}
-    slots = {"block": names[loose], "other": names[other]}
-    colored, picture = replace(scene, blocks=shown.blocks[:-1]), sight.goal_picture(shown, view)
-    return Asked(stem, colored, picture, slots, _OFFERED[stem], _KINDS[stem])
 
 
 def put_beside(block: Block, blocks: Sequence[Block], rng: np.random.Generator) -> Block:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 import re
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Literal
 
@@ -61,21 +61,33 @@ def orders_of(blocks: Sequence[Block]) -> list[int]:
     return [block.order for block in blocks]
 
 
+def block_of(blocks: Sequence[Block], order: int) -> Block:
+    """Return the block with this order."""
+    return next(block for block in blocks if block.order == order)
+
+
+def colored(blocks: Sequence[Block], colors: Mapping[int, Color]) -> tuple[Block, ...]:
+    """Return the blocks, each in its color by order, if it has one there."""
+    return tuple(replace(block, color=colors.get(block.order, block.color)) for block in blocks)
+
+
 def recolored(scene: Scene, rng: np.random.Generator) -> Scene:
     """Return the scene with one of three colors drawn for every block, so that color tells no
     shape.
     """
     colors = palette(rng)
-    drawn = zip(scene.blocks, rng.integers(len(colors), size=len(scene)), strict=True)
-    return replace(scene, blocks=tuple(replace(block, color=colors[i]) for block, i in drawn))
+    drawn = [colors[i] for i in rng.integers(len(colors), size=len(scene))]
+    by_order = dict(zip(orders_of(scene.blocks), drawn, strict=True))
+    return replace(scene, blocks=colored(scene.blocks, by_order))
 
 
 def with_own_colors(scene: Scene, orders: Sequence[int], rng: np.random.Generator) -> Scene:
     """Return the scene with a color for each of two blocks, and a third for all others."""
     first, second, rest = palette(rng)
-    own = dict(zip(orders, (first, second), strict=True))
-    blocks = (replace(block, color=own.get(block.order, rest)) for block in scene.blocks)
-    return replace(scene, blocks=tuple(blocks))
+    own = dict.fromkeys(orders_of(scene.blocks), rest) | dict(
+        zip(orders, (first, second), strict=True)
+    )
+    return replace(scene, blocks=colored(scene.blocks, own))
 
 
 def goal_picture(scene: Scene, view: View) -> QuestionPicture:
@@ -139,18 +151,15 @@ def seen_blocks(picture: QuestionPicture, least: float) -> list[Block]:
 
 def are_seen(picture: QuestionPicture, orders: Collection[int], least: float) -> bool:
     """True if each of the named blocks shows at least this share of itself."""
-    seen_share = shares(picture)
-    return all(seen_share[order] >= least for order in orders)
+    return set(orders) <= set(orders_of(seen_blocks(picture, least)))
 
 
 def require_seen(
     picture: QuestionPicture, least: float, blocks: Sequence[Block] | None = None
 ) -> None:
     """Raise UnfairError that names those of the blocks, or of all, that show less than `least`."""
-    seen_share = shares(picture)
-    orders = orders_of(picture.blocks if blocks is None else blocks)
-    hidden = [order for order in sorted(orders) if seen_share[order] < least]
-    if hidden:
+    orders = set(orders_of(picture.blocks if blocks is None else blocks))
+    if hidden := sorted(orders.difference(orders_of(seen_blocks(picture, least)))):
         raise UnfairError(f"blocks {hidden} show less than {least:.0%} of themselves")
 
 
@@ -262,6 +271,14 @@ def marked_order(picture: QuestionPicture, letter: str) -> int:
     raise UnfairError(f"no block is marked {letter}")
 
 
+def with_lot(
+    picture: QuestionPicture, lot: Collection[int], colors: Sequence[Color]
+) -> QuestionPicture:
+    """Return the picture with the blocks of a lot in the first color, all others in the second."""
+    own = {order: colors[order not in lot] for order in orders_of(picture.blocks)}
+    return replace(picture, blocks=colored(picture.blocks, own))
+
+
 def highlighted(
     picture: QuestionPicture, blocks: Sequence[Block], slots: Slots, taken: int | None = None
 ) -> frozenset[int]:
@@ -320,11 +337,18 @@ def resolve(text: str, picture: QuestionPicture, loosely: bool = False) -> tuple
     if match is None:
         raise UnfairError(f"{text!r} names no block")
     side, color, noun, layer, support = match.group("side", "color", "noun", "layer", "support")
-    fitting = [
-        block
-        for block in picture.blocks
-        if color in (None, block.color) and _is_called(block, noun, loosely, picture)
-    ]
+    types = set(_NOUNS[noun])
+    alike = types.union(*(SHAPES[one].mistaken_for for one in types))
+
+    def is_called(block: Block) -> bool:
+        if not loosely or noun == "block":
+            return block.type in types
+        if shows_profile(block, picture.view_deg):
+            return block.type in alike
+        # Seen from this side, it may be taken for anything but what it is.
+        return block.type not in types
+
+    fitting = [b for b in picture.blocks if color in (None, b.color) and is_called(b)]
     if layer is not None:
         layers = [block.layer for block in fitting]
         if len(set(layers)) < len(layers):
@@ -340,17 +364,7 @@ def resolve(text: str, picture: QuestionPicture, loosely: bool = False) -> tuple
     elif side is not None and fitting:
         found = outermost(fitting, picture, to_left=side == "leftmost")
         fitting = [found] if found else []
-    return tuple(block.order for block in fitting)
-
-
-def _is_called(block: Block, noun: str, loosely: bool, picture: QuestionPicture) -> bool:
-    types = set(_NOUNS[noun])
-    if not loosely or noun == "block":
-        return block.type in types
-    if not shows_profile(block, picture.view_deg):
-        # Seen from this side, it may be taken for anything but what it is.
-        return block.type not in types
-    return block.type in types.union(*(SHAPES[one].mistaken_for for one in types))
+    return tuple(orders_of(fitting))
 
 
 def resolve_one(text: str, picture: QuestionPicture) -> Block:
@@ -360,51 +374,35 @@ def resolve_one(text: str, picture: QuestionPicture) -> Block:
         raise UnfairError(f"{text!r} fits {len(orders)} blocks")
     if resolve(text, picture, loosely=True) != orders:
         raise UnfairError(f"{text!r} may be taken for another block")
-    return next(block for block in picture.blocks if block.order == orders[0])
+    return block_of(picture.blocks, orders[0])
 
 
 def names(block: Block, picture: QuestionPicture, features: Sequence[Feature]) -> tuple[str, ...]:
     """Return expressions that fit this block alone and speak of these features only, shortest
     first; none that says more than another.
     """
-    found: dict[str, Mapping[str, str]] = {}
-    for words in _expressions(block, picture, features):
-        text = _text_of(words)
-        is_longer = any(shorter.items() <= words.items() for shorter in found.values())
-        readings = (resolve(text, picture, loosely) for loosely in (False, True))
-        if not is_longer and all(reading == (block.order,) for reading in readings):
-            found[text] = words
-    return tuple(found)
-
-
-def _text_of(words: Mapping[str, str]) -> str:
-    simple = [words.get("side"), words.get("color"), words.get("noun", "block")]
-    layer = f"in layer {words['layer']}" if "layer" in words else ""
-    support = f"resting on the {words['support']}" if "support" in words else ""
-    return " ".join(filter(None, (*simple, layer, support)))
-
-
-def _expressions(
-    block: Block, picture: QuestionPicture, features: Sequence[Feature]
-) -> Iterator[dict[str, str]]:
-    """Yield all that is true of a block as words by feature, the simple before the long."""
-    true = {"color": block.color, "noun": shape_word(block.type)}
-    if "color" not in features:
-        del true["color"]
-    if "type" not in features:
-        del true["noun"]
-    simple: list[dict[str, str]] = [{}, *({name: word} for name, word in true.items())]
-    if len(true) > 1:
-        simple.append(true)
-    yield from simple
+    true = {"color": block.color, "type": shape_word(block.type)}
+    known = {name: word for name, word in true.items() if name in features}
+    simple: list[dict[str, str]] = [{}, *({name: word} for name, word in known.items())]
+    simple += [known] if len(known) > 1 else []
     further = [{"side": side} for side in _SIDE_WORDS] if "side" in features else []
-    further += [{"layer": str(block.layer)}] if "layer" in features else []
+    further += [{"layer": f"in layer {block.layer}"}] if "layer" in features else []
     below = [other for other in picture.blocks if other.order in block.depend]
     if "support" in features and len(below) == 1:
         plain = [feature for feature in features if feature in ("color", "type")]
-        further += [{"support": name} for name in names(below[0], picture, plain)]
-    for words in simple:
-        yield from ({**words, **more} for more in further)
+        supports = names(below[0], picture, plain)
+        further += [{"support": f"resting on the {support}"} for support in supports]
+    found: dict[str, Mapping[str, str]] = {}
+    for words in (*simple, *({**one, **more} for one in simple for more in further)):
+        if any(shorter.items() <= words.items() for shorter in found.values()):
+            continue
+        said = {"type": "block", **words}
+        order = ("side", "color", "type", "layer", "support")
+        text = " ".join(said[name] for name in order if name in said)
+        readings = (resolve(text, picture, loosely) for loosely in (False, True))
+        if all(reading == (block.order,) for reading in readings):
+            found[text] = words
+    return tuple(found)
 
 
 def drawn_name(

@@ -81,7 +81,9 @@ def _colorings(
     scene: Scene, rng: np.random.Generator, stem: str, first: View, second: View, side: str
 ) -> Iterator[Draft]:
     """Propose four colorings from the second view, one of which the first picture shows."""
-    pixels = [_pixels(scene.blocks, view) for view in (first, second)]
+    red = tuple(replace(block, color="red") for block in scene.blocks)
+    plain = [QuestionPicture("scene", red, view) for view in (first, second)]
+    pixels = [shown_pixels(picture, seen(picture)) for picture in plain]
     for _ in range(_FAMILIES_TRIED):
         scene = sight.recolored(scene, rng)
         four = [scene.blocks, *(_exchanged(scene.blocks, rng) for _ in LETTERS[1:])]
@@ -97,16 +99,6 @@ def _colorings(
             return
 
 
-def _unlike(four: Sequence[Sequence[Block]], pixels: dict[int, int]) -> float:
-    """Return the least share of what shows of the blocks in which two colorings differ."""
-    pairs = itertools.combinations(four, 2)
-    differing = (
-        sum(pixels[a.order] for a, b in zip(one, other, strict=True) if a.color != b.color)
-        for one, other in pairs
-    )
-    return min(differing) / sum(pixels.values())
-
-
 def _exchanged(blocks: Sequence[Block], rng: np.random.Generator) -> tuple[Block, ...]:
     """Return the blocks, those at each height with one another's colors."""
     colors: dict[int, Color] = {}
@@ -114,27 +106,33 @@ def _exchanged(blocks: Sequence[Block], rng: np.random.Generator) -> tuple[Block
         same = [block for block in blocks if round(block.position_m[2] / _LEVEL_M) == level]
         drawn = base.shuffled(rng, [block.color for block in same])
         colors |= dict(zip(sight.orders_of(same), drawn, strict=True))
-    return tuple(replace(block, color=colors[block.order]) for block in blocks)
+    return sight.colored(blocks, colors)
+
+
+def _unlike(four: Sequence[Sequence[Block]], pixels: dict[int, int]) -> float:
+    """Return the least share of what shows of the blocks in which two colorings differ."""
+    differing = (
+        sum(pixels[a.order] for a, b in zip(one, other, strict=True) if a.color != b.color)
+        for one, other in itertools.combinations(four, 2)
+    )
+    return min(differing) / sum(pixels.values())
 
 
 def _hits(four: Sequence[Sequence[Block]], first: dict[int, int], second: dict[int, int]) -> float:
-    """Return how many colorings the nearest histogram of colors finds; ties count in part."""
-    views = (first, second)
-    shown, options = (np.array([_histogram(blocks, one) for blocks in four]) for one in views)
-    far = np.abs(shown[:, None, :] - options[None, :, :]).sum(axis=2)
+    """Return how many colorings are found by the nearest shares of colors in what shows of the
+    blocks, rounded to a thousandth; ties count in part.
+    """
+
+    def shares(pixels: dict[int, int]) -> Floats:
+        counts = [
+            [sum(pixels[b.order] for b in blocks if b.color == color) for color in COLORS]
+            for blocks in four
+        ]
+        return np.round(np.array(counts) / sum(pixels.values()), 3)
+
+    far = np.abs(shares(first)[:, None, :] - shares(second)[None, :, :]).sum(axis=2)
     nearest = far <= far.min(axis=1, keepdims=True) + 1e-9
     return round(float((np.diag(nearest) / nearest.sum(axis=1)).sum()), 6)
-
-
-def _pixels(blocks: Sequence[Block], view: View) -> dict[int, int]:
-    plain = QuestionPicture("scene", tuple(replace(block, color="red") for block in blocks), view)
-    return shown_pixels(plain, seen(plain))
-
-
-def _histogram(blocks: Sequence[Block], pixels: dict[int, int]) -> Floats:
-    """Return the share of each color in what shows of the blocks, rounded to a thousandth."""
-    counts = [sum(pixels[b.order] for b in blocks if b.color == color) for color in COLORS]
-    return np.round(np.array(counts) / sum(counts), 3)
 
 
 # OR
@@ -159,36 +157,22 @@ class OrderingMaker(Maker):
         views = [
             base.drawn_view(rng) for _ in range(_VIEWS_TRIED if len(scene) >= _LEAST_BLOCKS else 0)
         ]
-        pictures = [QuestionPicture("scene", scene.blocks, v, framed=scene.blocks) for v in views]
-        orders = sight.orders_of(scene.blocks)
-        for plain in pictures:
-            if sight.are_seen(plain, orders, sight.COUNTED):
-                yield from self._about(scene, plain, rng)
-
-    def _about(
-        self, scene: Scene, plain: QuestionPicture, rng: np.random.Generator
-    ) -> Iterator[Draft]:
-        """Propose one question about a structure as it is seen."""
-        for _ in range(_CUTS_TRIED):
-            stages = _cut(scene, rng)
-            if _only_order(scene, stages) is None or _is_sorted_by_eye(plain, stages):
+        for view in views:
+            plain = QuestionPicture("scene", scene.blocks, view, framed=scene.blocks)
+            if not sight.are_seen(plain, sight.orders_of(scene.blocks), sight.COUNTED):
                 continue
-            kind, pair = pick(rng, ("or-build", "or-apart")), pick(rng, _PAIRS)
-            options = [
-                replace(
-                    plain,
-                    blocks=tuple(
-                        replace(b, color=pair[b.order not in stage]) for b in plain.blocks
-                    ),
-                )
-                for stage in stages
-            ]
-            if sight.are_told_apart(options):
-                ordered = options if kind == "or-build" else options[::-1]
-                slots: dict[str, str] = {"color": pair[0], "other": pair[1]}
-                facts = {"stages": [sorted(stage) for stage in stages]}
-                yield Draft(scene, kind, tuple(ordered), (), slots, facts)
-                return
+            for _ in range(_CUTS_TRIED):
+                stages = _cut(scene, rng)
+                if _only_order(scene, stages) is None or _is_sorted_by_eye(plain, stages):
+                    continue
+                kind, pair = pick(rng, ("or-build", "or-apart")), pick(rng, _PAIRS)
+                options = [sight.with_lot(plain, stage, pair) for stage in stages]
+                if sight.are_told_apart(options):
+                    ordered = options if kind == "or-build" else options[::-1]
+                    slots: dict[str, str] = {"color": pair[0], "other": pair[1]}
+                    facts = {"stages": [sorted(stage) for stage in stages]}
+                    yield Draft(scene, kind, tuple(ordered), (), slots, facts)
+                    break
 
     def rederive(self, question: Question) -> tuple[int, ...]:
         """Find the one order that follows from what rests on what."""

@@ -9,32 +9,16 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from pathlib import Path
 
 from phyblock.domain.blocks import KIT_PALETTE, BlockType
 from phyblock.domain.scene import MAX_CANDIDATES, Candidate, CandidateSet, Kind, Look, Scene
 from phyblock.errors import DataError, Problem
+from phyblock.files import read_own_yaml
 from phyblock.making.scenes.sketch import POSES
 from phyblock.text import drawn_bytes
 
-NEEDED: dict[BlockType, dict[str, float]] = {
-    "arch": {"gate": 0.196, "gate-turned": 0.081, "cradle": 0.05, "cradle-turned": 0.032},
-    "cube": {"flat": 1.246},
-    "cuboid1": {"flat": 0.5, "edge-x": 0.059, "edge-y": 0.052},
-    "cuboid2": {
-        **{"flat-x": 0.191, "flat-y": 0.348, "edge-x": 0.032, "edge-y": 0.01},
-        **{"upright-x": 0.018, "upright-y": 0.012},
-    },
-    "cuboid3": {"flat-x": 0.138, "flat-y": 0.267, "edge-x": 0.01, "edge-y": 0.004},
-    "cylinder": {"upright": 0.335, "lying-x": 0.058, "lying-y": 0.045},
-    "semi_cylinder": {
-        **{"dome": 0.408, "dome-turned": 0.276, "round+x": 0.014, "round+y": 0.029},
-        **{"round-x": 0.013, "round-y": 0.024},
-    },
-    "triangle": {
-        **{"roof": 0.261, "roof-turned": 0.215, "ramp+y": 0.273, "ramp-x": 0.128},
-        **{"ramp-y": 0.258, "ramp+x": 0.125},
-    },
-}
+NEEDED: dict[BlockType, dict[str, float]] = read_own_yaml(Path(__file__).with_name("needed.yaml"))
 """Looks of a type and pose that a goal of the grammar needs on average, over its colors:
 counted in 1,200 goals. Poses that no goal needs give themselves away and are not offered.
 """

@@ -107,7 +107,7 @@ def complete(read: ReadScene) -> Completed:
     if found:
         raise DataError(
             replace(
-                one.problem,
+                one,
                 where=read.where,
                 message=f"scene {read.name}: {one.message}",
                 hint=hint if one.check in ("order", "unstable step") else "",

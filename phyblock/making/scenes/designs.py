@@ -245,22 +245,6 @@ def _balance(d: Draft) -> None:
     d.any_of(f"2 semi_cylinder {half}", f"2 triangle {half}")
 
 
-BUILDINGS: dict[str, Theme] = {
-    "arcade": _arcade,
-    "balance": _balance,
-    "bridge": _bridge,
-    "court": _court,
-    "gate": _gate,
-    "henge": _henge,
-    "house": _house,
-    "monument": _monument,
-    "pyramid": _pyramid,
-    "stair": _stair,
-    "tower": _tower,
-    "wall": _wall,
-}
-
-
 def _animal(d: Draft) -> None:
     """Four legs, a back, a neck and a head at one end, a tail at the other."""
     legs = d.pick(("arch", "arch", "arches", "cubes", "posts", "feet"))
@@ -400,20 +384,6 @@ def _tree(d: Draft) -> None:
         d.build("cuboid3:flat-y; 2 semi_cylinder 2; cube +1; triangle")
 
 
-CREATURES: dict[str, Theme] = {
-    "animal": _animal,
-    "car": _car,
-    "chair": _chair,
-    "figure": _figure,
-    "fountain": _fountain,
-    "rocket": _rocket,
-    "ship": _ship,
-    "slide": _slide,
-    "table": _table,
-    "tree": _tree,
-}
-
-
 def _crane(d: Draft) -> None:
     """A beam whose load tips it where the weight at its other end is not there first."""
     column(d, d.pick((1, 2, 2, 3)))
@@ -433,8 +403,6 @@ def _keep(d: Draft) -> None:
     d.build("top")
 
 
-_TALL: dict[str, Theme] = {"crane": _crane, "keep": _keep}
-"""Parts of great structures alone."""
 _ACROSS = Symmetry(2, mirrored=True)
 """The mirror image across the plane y = 0."""
 
@@ -462,7 +430,7 @@ def beside(parts: Sequence[Sequence[Block]], gap_units: float, axis: int = 1) ->
 def _part(d: Draft, *names: str) -> list[Block]:
     """The blocks of a part drawn apart, in the colors of the whole."""
     apart = d.fresh()
-    d.pick([{**BUILDINGS, **CREATURES, **_TALL}[name] for name in names])(apart)
+    THEMES[d.pick(names)](apart)
     return apart.blocks
 
 
@@ -493,14 +461,6 @@ def _train(d: Draft) -> None:
     d.blocks += beside(cars, 1.0)
 
 
-COMPOSITIONS: dict[str, Theme] = {
-    "avenue": _avenue,
-    "framed": _framed,
-    "street": _street,
-    "train": _train,
-}
-
-
 def _castle(d: Draft) -> None:
     """Towers, wings and a middle, mirrored."""
     side = _part(d, "tower", "keep", "crane")
@@ -524,4 +484,12 @@ def _town(d: Draft) -> None:
     d.blocks += beside(row, d.pick((1.0, 2.0)))
 
 
-GREAT: dict[str, Theme] = {"castle": _castle, "site": _site, "town": _town}
+THEMES: dict[str, Theme] = {
+    theme.__name__[1:]: theme
+    for theme in (
+        *(_arcade, _balance, _bridge, _court, _gate, _henge, _house, _monument, _pyramid, _stair),
+        *(_tower, _wall, _animal, _car, _chair, _figure, _fountain, _rocket, _ship, _slide, _table),
+        *(_tree, _avenue, _framed, _street, _train, _castle, _site, _town, _crane, _keep),
+    )
+}
+"""By name: buildings, creatures and things, compositions, great ones, and parts of these alone."""

@@ -13,6 +13,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence, Set
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -22,15 +23,14 @@ from phyblock.domain.blocks import COLORS
 from phyblock.domain.scene import AssemblyTask, Block, CycleError, Kind, Scene
 from phyblock.domain.symmetry import SYMMETRIES, fingerprint
 from phyblock.errors import DataError, Problem
-from phyblock.files import bundled
+from phyblock.files import bundled, read_own_yaml
 from phyblock.making.checks import LEVEL_LIMITS, is_acceptable
 from phyblock.making.scenes.candidates import make_candidates
-from phyblock.making.scenes.designs import BUILDINGS, COMPOSITIONS, CREATURES, GREAT, beside
+from phyblock.making.scenes.designs import THEMES, beside
 from phyblock.making.scenes.sketch import (
     PALETTES,
     Draft,
     Palette,
-    Theme,
     colorless,
     make_scene,
     transformed,
@@ -39,29 +39,25 @@ from phyblock.sim.contact import find_gaps
 from phyblock.text import drawn_bytes
 from phyblock.workers import Workers
 
-Group = Literal["1", "1+2", "2", "3", "4", "5"]
-GROUP_LEVELS: dict[Group, tuple[int, ...]] = {
-    "1": (1,),
-    "1+2": (1, 2),
-    "2": (2,),
-    "3": (3,),
-    "4": (4,),
-    "5": (5,),
-}
-"""Levels that a scene of each group counts in."""
+Source = tuple[int, tuple[str, ...]]
+"""A number of parents of a variation, and the groups that they are drawn from."""
 
-_ALL: dict[str, Theme] = {**BUILDINGS, **CREATURES, **COMPOSITIONS, **GREAT}
-_LARGE = ("arcade", "balance", "court", "figure", "fountain", "henge", "wall")
-_SMALL = sorted(name for name in (*BUILDINGS, *CREATURES) if name not in _LARGE)
-_THEMES: dict[Group, tuple[str, ...]] = {
-    "1": tuple(name for name in _SMALL if name != "stair"),
-    "1+2": tuple(name for name in _SMALL if name not in ("rocket", "stair")),
-    "2": (*_SMALL, "figure", "henge"),
-    "3": tuple(sorted((*BUILDINGS, *CREATURES))),
-    "4": (*sorted(COMPOSITIONS), "house", "framed", "street", "court", "avenue", "pyramid"),
-    "5": tuple(GREAT),
+
+class Group(NamedTuple):
+    """What is asked of the scenes of a group, and what they are made from (`groups.yaml`)."""
+
+    levels: tuple[int, ...]
+    least: int
+    base: int
+    varied: int
+    themes: tuple[str, ...]
+    sources: tuple[Source, ...]
+
+
+GROUPS: dict[str, Group] = {
+    name: Group(**facts)
+    for name, facts in read_own_yaml(Path(__file__).with_name("groups.yaml")).items()
 }
-_LEAST: dict[Group, int] = {"1": 2, "1+2": 3, "2": 4, "3": 6, "4": 13, "5": 23}
 _TRIES = 25
 _KEPT = 2048
 """Base scenes that are remembered, as many variations are drawn from each."""
@@ -74,7 +70,7 @@ class Request:
 
     seed: int
     palette: Palette
-    group: Group
+    group: str
     number: int
     parents: tuple[Request, ...] = ()
 
@@ -91,19 +87,36 @@ def draw(request: Request) -> Scene | None:
     A name is `THEME`, or `recolored` or `combined` for a variation. Its `parents` are empty: the
     names of scenes are given when they are accepted.
     """
-    if request.parents:
-        name, blocks = _variation(request)
-        return _fitting(name, request.group, blocks)
-    return _drawn_base(request)
+    if not request.parents:
+        return _drawn_base(request)
+    rng = request.rng()
+    parts: list[tuple[Block, ...]] = []
+    for parent in request.parents:
+        scene = draw(parent)
+        assert scene is not None
+        symmetry = SYMMETRIES[int(rng.integers(len(SYMMETRIES)))]
+        parts.append(transformed(scene.blocks, symmetry))
+    if len(parts) > 1:
+        gap, axis = (1.0, 1.0, 2.0)[int(rng.integers(3))], (1, 1, 0)[int(rng.integers(3))]
+        return _fitting("combined", request.group, beside(parts, gap, axis))
+    # Blocks of one type and color stay of one color, another one where the palette has one.
+    taken: dict[Kind, Kind] = {}
+    for kind in dict.fromkeys(block.kind for block in parts[0]):
+        kinds = [(kind[0], color) for color in COLORS if color != kind[1]]
+        free = [one for one in kinds if one in PALETTES[request.palette]]
+        unused = [one for one in free if one not in taken.values()] or [kind]
+        taken[kind] = unused[int(rng.integers(len(unused)))]
+    blocks = [replace(block, color=taken[block.kind][1]) for block in parts[0]]
+    return _fitting("recolored", request.group, blocks)
 
 
 @functools.lru_cache(maxsize=_KEPT)
 def _drawn_base(request: Request) -> Scene | None:
-    names = _THEMES[request.group]
+    names = GROUPS[request.group].themes
     name, rng = names[request.number % len(names)], request.rng()
     for _ in range(_TRIES):
         draft = Draft(rng, request.palette)
-        _ALL[name](draft)
+        THEMES[name](draft)
         scene = _fitting(name, request.group, draft.blocks)
         if scene is not None:
             # A block let down along the face of another may catch on its edge and hang there.
@@ -111,80 +124,30 @@ def _drawn_base(request: Request) -> Scene | None:
     return None
 
 
-def _fitting(name: str, group: Group, blocks: list[Block]) -> Scene | None:
-    levels = GROUP_LEVELS[group]
-    most = min(LEVEL_LIMITS[level].most_blocks for level in levels)
-    if not _LEAST[group] <= len(blocks) <= most:
+def _fitting(name: str, group: str, blocks: list[Block]) -> Scene | None:
+    """Return the scene of blocks, if it keeps the limits of a group."""
+    levels = tuple(GROUPS[group].levels)
+    limits = [LEVEL_LIMITS[level] for level in levels]
+    if not GROUPS[group].least <= len(blocks) <= min(limit.most_blocks for limit in limits):
         return None
     try:
         scene = make_scene(name, levels, blocks)
     except CycleError:
         return None
-    layers = max(scene.graph.layers)
-    if layers > min(LEVEL_LIMITS[level].most_layers for level in levels):
+    if max(scene.graph.layers) > min(limit.most_layers for limit in limits):
         return None
     return scene if len({block.look for block in scene.blocks}) <= _MAX_LOOKS else None
 
 
-def _variation(request: Request) -> tuple[str, list[Block]]:
-    """One parent in other colors, or two side by side; each turned and mirrored at random."""
-    rng = request.rng()
-    parts: list[list[Block]] = []
-    for parent in request.parents:
-        scene = draw(parent)
-        assert scene is not None
-        symmetry = SYMMETRIES[int(rng.integers(len(SYMMETRIES)))]
-        parts.append(list(transformed(scene.blocks, symmetry)))
-    if len(parts) == 1:
-        return "recolored", _recolored(parts[0], request.palette, rng)
-    gap, axis = (1.0, 1.0, 2.0)[int(rng.integers(3))], (1, 1, 0)[int(rng.integers(3))]
-    return "combined", beside(parts, gap, axis)
-
-
-def _recolored(blocks: list[Block], palette: Palette, rng: np.random.Generator) -> list[Block]:
-    """Blocks of one type and color stay of one color, another one where the palette has one."""
-    taken: dict[Kind, Kind] = {}
-    for block in blocks:
-        if block.kind in taken:
-            continue
-        free = [
-            (block.type, color)
-            for color in COLORS
-            if (block.type, color) in PALETTES[palette] and (block.type, color) != block.kind
-        ]
-        unused = [kind for kind in free if kind not in taken.values()] or [block.kind]
-        taken[block.kind] = unused[int(rng.integers(len(unused)))]
-    return [replace(block, color=taken[block.kind][1]) for block in blocks]
-
-
-_SHARES: dict[Group, tuple[int, int]] = {
-    "1": (16, 6),
-    "1+2": (10, 4),
-    "2": (36, 71),
-    "3": (68, 70),
-    "4": (20, 99),
-    "5": (60, 40),
-}
-"""Base scenes and variations in each group, of 400 of levels 1 to 4."""
-_SOURCES: dict[Group, tuple[tuple[int, tuple[Group, ...]], ...]] = {
-    "1": ((1, ("1",)),),
-    "1+2": ((1, ("1+2", "1")),),
-    "2": ((1, ("2",)), (1, ("1", "1+2", "2")), (2, ("1", "1+2"))),
-    "3": ((1, ("3",)), (2, ("1", "1+2", "2")), (2, ("1", "1+2", "2", "3"))),
-    "4": ((2, ("3",)), (2, ("3",)), (2, ("3",)), (2, ("3",)), (1, ("4",))),
-    "5": ((1, ("5",)), (2, ("4",)), (2, ("3", "4"))),
-}
-"""Sources of variations: the number of parents, and their groups."""
 _PATIENCE = 150
 """So many candidates running that are refused or known end the search."""
 _LARGEST_ROUND = 256
 
 
-@dataclass(frozen=True)
-class Share:
+class Share(NamedTuple):
     """The scenes of a group that are wanted: drawn by the grammar, and made from those."""
 
-    group: Group
+    group: str
     base: int
     varied: int
 
@@ -195,10 +158,10 @@ def shares(count: int, levels: Sequence[int] = (1, 2, 3, 4)) -> tuple[Share, ...
     Scenes of levels 1 and 2 are asked for when both levels are. Largest remainders decide.
     """
     wanted = {
-        (group, part): number
-        for group, numbers in _SHARES.items()
-        if set(GROUP_LEVELS[group]) <= set(levels)
-        for part, number in enumerate(numbers)
+        (name, part): (group.base, group.varied)[part]
+        for name, group in GROUPS.items()
+        if set(group.levels) <= set(levels)
+        for part in (0, 1)
     }
     total = sum(wanted.values())
     exact = {key: count * number / total for key, number in wanted.items()}
@@ -206,8 +169,8 @@ def shares(count: int, levels: Sequence[int] = (1, 2, 3, 4)) -> tuple[Share, ...
     by_rest = sorted(exact, key=lambda key: (given[key] - exact[key], key[1], key[0]))
     for key in by_rest[: count - sum(given.values())]:
         given[key] += 1
-    groups = dict.fromkeys(group for group, _ in wanted)
-    return tuple(Share(group, given[group, 0], given[group, 1]) for group in groups)
+    names = dict.fromkeys(name for name, _ in wanted)
+    return tuple(Share(name, given[name, 0], given[name, 1]) for name in names)
 
 
 @functools.cache
@@ -252,7 +215,7 @@ class Production:
         self._excluded, self.rejected = excluded, 0
         self._seen: set[bytes] = set()
         self._bases: dict[Request, str] = {}
-        self._next: Counter[Group] = Counter()
+        self._next: Counter[str] = Counter()
         self._named: Counter[int] = Counter()
         self._width = 3
 
@@ -267,7 +230,7 @@ class Production:
         for share in wanted:
             yield from self.variations(share.group, share.varied)
 
-    def bases(self, group: Group, wanted: int) -> Iterator[Scene]:
+    def bases(self, group: str, wanted: int) -> Iterator[Scene]:
         """Scenes that the grammar draws."""
         taken = 0
         request = partial(Request, self._seed, self._palette, group)
@@ -281,10 +244,10 @@ class Production:
             hint = "ask for fewer scenes, for other levels, or for --palette full"
             raise DataError(Problem(f"level {group}", message, hint=hint))
 
-    def variations(self, group: Group, wanted: int) -> Iterator[Scene]:
+    def variations(self, group: str, wanted: int) -> Iterator[Scene]:
         """Variations, and base scenes for what is missing where there are too few to vary."""
         sources = []
-        for count, groups in _SOURCES[group]:
+        for count, groups in GROUPS[group].sources:
             bases = [base for one in groups for base in self._bases if base.group == one]
             if len(bases) >= count:
                 sources.append((count, bases))
@@ -374,7 +337,7 @@ def _streamed(
     parts = [(share, part) for share in shares(10_000, levels) for part in (0, 1)]
     weights = np.array([(share.base, share.varied)[part] for share, part in parts])
 
-    def base(group: Group) -> Request:
+    def base(group: str) -> Request:
         return Request(int(rng.integers(2**62)), palette, group, int(rng.integers(2**31)))
 
     for _ in range(_LONGEST_SEARCH):
@@ -382,7 +345,8 @@ def _streamed(
         made = base(share.group)
         parents: list[Drawn] = []
         if is_varied:
-            count, groups = _SOURCES[share.group][int(rng.integers(len(_SOURCES[share.group])))]
+            found = GROUPS[share.group].sources
+            count, groups = found[int(rng.integers(len(found)))]
             sources = [base(groups[int(rng.integers(len(groups)))]) for _ in range(count)]
             parents = [one for one in map(_drawn, sources) if one is not None]
             if len(parents) < count:
