@@ -13,8 +13,7 @@ from phyblock.domain.blocks import BLOCK_TYPES, KIT_PALETTE, SHAPES
 from phyblock.domain.scene import Block
 from phyblock.domain.symmetry import SYMMETRIES, canonical_form
 from phyblock.making.checks import FORM, PHYSICS, SceneFacts, check_set, findings_of
-from phyblock.making.scenes import designs, production
-from phyblock.making.scenes.designs import THEMES, beside
+from phyblock.making.scenes import production
 from phyblock.making.scenes.production import (
     GROUPS,
     Production,
@@ -25,7 +24,15 @@ from phyblock.making.scenes.production import (
     shares,
     split_tasks,
 )
-from phyblock.making.scenes.sketch import PALETTES, POSES, Draft, colorless, scene_of, transformed
+from phyblock.making.scenes.sketch import (
+    PALETTES,
+    POSES,
+    Draft,
+    beside,
+    colorless,
+    scene_of,
+    transformed,
+)
 from phyblock.sim import dynamics
 from phyblock.sim.balance import is_balanced, surely_falls, surely_stands
 from phyblock.sim.contact import bounds_m, find_gaps, find_overlaps, support_graph
@@ -95,13 +102,15 @@ def test_most_requests_give_a_scene_and_the_same_one_again(group):
     assert scenes == [draw(Request(1, "kit", group, number)) for number in range(20)]
 
 
-@pytest.mark.parametrize("name", sorted(THEMES))
+THEMES = sorted({theme for group in GROUPS.values() for theme in group.themes})
+
+
+@pytest.mark.parametrize("name", THEMES)
 def test_every_theme_varies(name):
-    theme = THEMES[name]
     forms = set()
     for seed in range(10):
         draft = Draft(np.random.default_rng(seed))
-        theme(draft)
+        draft.follow(name)
         assert [block.order for block in draft.blocks] == list(range(1, len(draft.blocks) + 1))
         assert {block.kind for block in draft.blocks} <= set(KIT_PALETTE)
         forms.add(canonical_form(draft.blocks))
@@ -194,7 +203,7 @@ def test_great_scenes_are_within_their_level_and_stand():
 @pytest.mark.parametrize("seed", range(4))
 def test_a_crane_holds_only_where_its_weight_is_there_first(seed):
     draft = Draft(np.random.default_rng(seed))
-    designs._crane(draft)
+    draft.follow("crane")
     beam = next(one.order for one in draft.blocks if one.type == "cuboid3")
     weight, load = beam, beam + 1
     assert surely_stands(draft.blocks)

@@ -26,11 +26,11 @@ from phyblock.errors import DataError, Problem
 from phyblock.files import bundled, read_own_yaml
 from phyblock.making.checks import LEVEL_LIMITS, is_acceptable
 from phyblock.making.scenes.candidates import make_candidates
-from phyblock.making.scenes.designs import THEMES, beside
 from phyblock.making.scenes.sketch import (
     PALETTES,
     Draft,
     Palette,
+    beside,
     colorless,
     make_scene,
     transformed,
@@ -116,7 +116,7 @@ def _drawn_base(request: Request) -> Scene | None:
     name, rng = names[request.number % len(names)], request.rng()
     for _ in range(_TRIES):
         draft = Draft(rng, request.palette)
-        THEMES[name](draft)
+        draft.follow(name)
         scene = _fitting(name, request.group, draft.blocks)
         if scene is not None:
             # A block let down along the face of another may catch on its edge and hang there.

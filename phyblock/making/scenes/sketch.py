@@ -1,23 +1,26 @@
 """A sketch pad for structures: put blocks down one after another, as a person builds.
 
 A block is let down from above at a place on the grid, in a pose by its name, and its height follows
-from what it lands on; so a design holds no heights, no overlap and no gap.
+from what it lands on; so a design holds no heights, no overlap and no gap. Rules that draw whole
+structures are in `rules.yaml`.
 """
 
 from __future__ import annotations
 
 import copy
 import functools
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
-from typing import Literal, TypeVar
+from pathlib import Path
+from typing import Any, Literal, TypeVar, cast
 
 import numpy as np
 
 from phyblock.domain.blocks import BLOCK_TYPES, COLORS, KIT_PALETTE, SHAPES, BlockType, Color, Euler
 from phyblock.domain.scene import AOVGraph, Block, Scene
 from phyblock.domain.symmetry import Symmetry, fingerprint, image_deg, image_m, pose_class
+from phyblock.files import read_own_yaml
 from phyblock.sim.contact import GROUND, drop_height_m, support_graph, whole_bounds_m
 from phyblock.sim.geometry import corners_m
 
@@ -99,6 +102,13 @@ PALETTES: dict[Palette, tuple[tuple[BlockType, Color], ...]] = {
 }
 """The pairs of type and color in each palette."""
 T = TypeVar("T")
+Step = str | list[Any] | dict[str, Any]
+
+
+@functools.cache
+def rules() -> dict[str, Step]:
+    """Return the rules by which structures are drawn, by name."""
+    return cast(dict[str, Step], read_own_yaml(Path(__file__).with_name("rules.yaml")))
 
 
 class Draft:
@@ -117,12 +127,6 @@ class Draft:
         if palette == "full":
             drawn = rng.integers(len(COLORS), size=len(BLOCK_TYPES))
             self._colors = {t: COLORS[int(i)] for t, i in zip(BLOCK_TYPES, drawn, strict=True)}
-
-    def fresh(self) -> Draft:
-        """Return an empty draft with the same colors and the same random source."""
-        other = copy.copy(self)
-        other.blocks = []
-        return other
 
     def pick(self, options: Sequence[T]) -> T:
         """One of the options, all alike."""
@@ -182,12 +186,53 @@ class Draft:
                 sided = f"{pose}{'-+'[sign > 0]}y" if pose in ("ramp", "round") else pose
                 self.put(block_type, sign * float(y), float(x or 0), sided, color)  # type: ignore[arg-type]
 
-    def any_of(self, *texts: str, tone: int = 0) -> str:
-        """Build one of the texts, all alike, and return it."""
-        text = self.pick(texts)
-        self.build(text, tone)
-        return text
+    def follow(self, steps: Step, tone: int = 0) -> None:
+        """Do the steps of a rule of `rules.yaml` one after another, in tones above `tone`."""
+        for step in steps if isinstance(steps, list) else [steps]:
+            if isinstance(step, list):
+                self.follow(self.pick(step), tone)
+            elif isinstance(step, dict) and "maybe" in step:
+                is_done = self.maybe(step.get("chance", 0.5))
+                self.follow(step["maybe"] if is_done else step.get("else", ""), tone)
+            elif isinstance(step, dict):
+                parts: dict[str, list[Block]] = {}
+                for name, names in step["parts"].items():
+                    apart = copy.copy(self)
+                    parts[name] = apart.blocks = []
+                    apart.follow(apart.pick(names))
+                row = [
+                    transformed(parts[name[1:]], _ACROSS) if name[0] == "~" else parts[name]
+                    for name in step["row"]
+                ]
+                self.blocks += beside(row, self.pick(step["gaps"]))
+            else:
+                for part in filter(None, step.split("; ")):
+                    name, *raised = part.split()
+                    if name in rules():
+                        self.follow(rules()[name], tone + sum(map(int, raised)))
+                    else:
+                        self.build(part, tone)
 
 
-Theme = Callable[[Draft], None]
-"""A rule that draws a whole structure."""
+_ACROSS = Symmetry(2, mirrored=True)
+"""The mirror image across the plane y = 0."""
+
+
+def beside(parts: Sequence[Sequence[Block]], gap_units: float, axis: int = 1) -> list[Block]:
+    """Return the parts in a row with gaps between their outlines [grid units], numbered through.
+
+    They stand side by side along x, the depth (`axis` 0), or y, the front (1).
+    """
+    row: list[Block] = []
+    edge_m = 0.0
+    for part in parts:
+        low_m, high_m = whole_bounds_m(part)
+        shift = -(low_m + high_m) / 2
+        shift[2] = 0.0
+        shift[axis] = edge_m - low_m[axis]
+        for block in part:
+            x, y, z = np.round(np.array(block.position_m) + shift, 6) + 0.0
+            place = (float(x), float(y), float(z))
+            row.append(replace(block, order=len(row) + 1, position_m=place))
+        edge_m += float(high_m[axis] - low_m[axis]) + gap_units * UNIT_M
+    return row
