@@ -105,10 +105,8 @@ def _making(
     out: Path,
     names: Sequence[str],
     work: str,
-    *,
-    jobs: int,
-    ray_address: str | None,
     shard: tuple[int, int] | None,
+    **pool: Any,
 ) -> Iterator[tuple[Workers, Shards | None]]:
     """Open workers for a set with files of these names; `work` describes it.
 
@@ -117,7 +115,10 @@ def _making(
     if shard is None or not shards_folder(out).exists():
         files.check_out(out, names)
     shards = open_shards(shard, out, f"{work}\n{described_engine()}\n{season.code_digest()}\n")
-    with open_workers(jobs, ray_address, shards) as workers:
+    if other := other_engine():
+        message = f"made with {other}: the default one may make another set of the same seed"
+        click.echo(message, err=True)
+    with open_workers(**pool, shards=shards) as workers:
         yield workers, shards
 
 
@@ -125,14 +126,6 @@ def _mapped(function: Callable[[T], R], items: Sequence[T], jobs: int, doing: st
     """Return the results of a function for the items, from `jobs` processes, with progress."""
     with open_workers(min(jobs, len(items) or 1)) as workers:
         return list(tracked(workers.map(function, items), len(items), doing))
-
-
-def _print_engine() -> None:
-    """Warn on standard error if the default engine may make another set from the same seed."""
-    if other := other_engine():
-        click.echo(
-            f"made with {other}: the default one may make another set of the same seed", err=True
-        )
 
 
 def _conclude(name: str, problems: Iterable[Problem | str]) -> None:
@@ -209,7 +202,6 @@ def generate_scenes(
     click.echo(f"{counted(count, 'scene')}, all checks passed: {shown_path(out)}")
     known = "the built-in set or an excluded one" if exclude else "the built-in set"
     click.echo(f"{counted(production.rejected, 'draft')} rejected: a scene of {known}")
-    _print_engine()
 
 
 def _settled(count: int, levels: Sequence[str], palette: str, exclude: Sequence[str]) -> str:
@@ -425,9 +417,8 @@ def render(
     background: str,
     composite: bool,
     gif: bool,
-    jobs: int,
-    ray_address: str | None,
     shard: tuple[int, int] | None,
+    **pool: Any,
 ) -> None:
     """Draw the scenes SCENE... of the data set PATH, or all of them, at 512 by 512 pixels.
 
@@ -450,7 +441,7 @@ def render(
     OutFolder(out).check(drawings)
     work = f"scenes render: {read.sha256} {hex_digest(repr([RENDER_VERSION, *drawings]))}\n"
     shards = open_shards(shard, out, work)
-    with open_workers(jobs, ray_address, shards) as workers:
+    with open_workers(**pool, shards=shards) as workers:
         _draw(out, drawings, workers, shards)
     if not left_to_first(shards, out):
         click.echo(f"{counted(len(drawings), 'file')} in {shown_path(out)}")
@@ -545,7 +536,6 @@ def generate_questions(
     outcome = f"{counted(len(made), 'question')} in {counted(len(subtasks), 'subtask')}"
     each_s = sum(os.times()[:4]) / len(made)
     click.echo(f"{outcome}, {each_s:.1f} CPU seconds each: {shown_path(out)}")
-    _print_engine()
 
 
 @questions.command("verify")

@@ -2,6 +2,7 @@
 
 import itertools
 from collections import Counter
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -38,9 +39,9 @@ from phyblock.making.questions.properties import layers_of, sure_blocks
 from phyblock.making.questions.relations import (
     AXIS_TURNS,
     LENGTHS,
-    axis_turns,
+    images,
+    phrases,
     put_beside,
-    tipped_over,
 )
 from phyblock.making.questions.sight import SHAPE_WORDS, names, resolve, resolve_one
 from phyblock.making.questions.views import ViewpointMaker
@@ -110,11 +111,12 @@ def test_a_turn_is_the_one_that_was_made(kind, data):
     euler = data.draw(st.sampled_from(sorted(POSES[kind].values())))
     lying = block(1, (0, 0, 0.1), kind=kind, euler=euler)
     try:
-        turned = tipped_over(lying)
+        turned = [replace(lying, euler_deg=euler) for _, euler in images("rr-axis", lying)]
     except UnfairError:
         return
-    assert axis_turns(lying, lying)[0] == AXIS_TURNS[0]
-    assert {name for one in turned for name in axis_turns(one, lying)} == set(AXIS_TURNS)
+    assert AXIS_TURNS[0] in phrases("rr-axis", lying, lying)
+    said = {name for one in turned for name in phrases("rr-axis", one, lying)}
+    assert said == set(AXIS_TURNS)
 
 
 @settings(max_examples=30)

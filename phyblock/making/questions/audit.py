@@ -20,7 +20,6 @@ import numpy as np
 
 from phyblock.domain.question import LETTERS, SUBTASKS, Question, QuestionPicture, Subtask
 from phyblock.errors import Problem, SpecError
-from phyblock.making.questions.base import Floats
 from phyblock.making.questions.guesses import measures_of, text_features
 from phyblock.making.questions.production import BALANCE
 from phyblock.tracks.questions import FOLDS, Folds, Rule, guesses_of, majority_rule
@@ -194,9 +193,13 @@ def picture_probe(questions: Sequence[Question], folds: Folds) -> dict[str, Prob
             known = [q for q in members if folds.is_known(fold, q)]
             if not held_out or len(known) < _FEWEST:
                 continue
-            # The means over the four options are zero, and so is that of what each is worth.
+            # The means over the four options are zero, and so is that of what each is worth: the
+            # right one 1 and others 0, or in an order the first most.
             rows = np.vstack([rows_of[q.id] for q in known])
-            worth = np.concatenate([_worth(q) for q in known])
+            values = np.zeros((len(known), len(LETTERS)))
+            for value, q in zip(values, known, strict=True):
+                value[list(q.answer)] = np.arange(len(q.answer), 0, -1)
+            worth = (values - values.mean(axis=1, keepdims=True)).ravel()
             gram = rows.T @ rows + _RIDGE * np.eye(rows.shape[1])
             weights = np.linalg.solve(gram, rows.T @ worth)
             for question in held_out:
@@ -206,10 +209,3 @@ def picture_probe(questions: Sequence[Question], folds: Folds) -> dict[str, Prob
         if n:
             found[kind] = Probe(right, n)
     return found
-
-
-def _worth(question: Question) -> Floats:
-    """1 for the right option and 0 for others, less the mean; in an order, the first most."""
-    worth = np.zeros(len(question.options))
-    worth[list(question.answer)] = np.arange(len(question.answer), 0, -1)
-    return np.asarray(worth - worth.mean())

@@ -125,16 +125,14 @@ class Asked(NamedTuple):
     kind: str = ""
 
 
+_VIEWS_A_SCENE, _DRAFTS_A_VIEW = 3, 8
+
+
 class StaticMaker(Maker):
     """Makes questions about one picture, from views drawn for each scene."""
 
     spare = 20.0
-    views_a_scene: int = 3
-    drafts_a_view: int = 8
-
-    def __init_subclass__(cls) -> None:
-        """Derive the most drafts of a scene from those of a view."""
-        cls.drafts_a_scene = cls.views_a_scene * cls.drafts_a_view
+    drafts_a_scene = _VIEWS_A_SCENE * _DRAFTS_A_VIEW
 
     @abstractmethod
     def ask(self, scene: Scene, view: View, rng: np.random.Generator) -> Iterator[Asked]:
@@ -150,9 +148,9 @@ class StaticMaker(Maker):
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """Yield fair questions about a scene, view by view."""
-        for _ in range(self.views_a_scene):
+        for _ in range(_VIEWS_A_SCENE):
             asked = self.ask(scene, drawn_view(rng), rng)
-            yield from itertools.islice(self._answered(asked, rng), self.drafts_a_view)
+            yield from itertools.islice(self._answered(asked, rng), _DRAFTS_A_VIEW)
 
     def _answered(self, asked: Iterator[Asked], rng: np.random.Generator) -> Iterator[Draft]:
         for one in asked:

@@ -808,7 +808,14 @@ def four_of(
     apart = np.array([np.linalg.norm(pixels[i] - pixels[j], axis=1) for i, j in pairs])
     is_other = np.array([points.on[i] != points.on[j] for i, j in pairs])
     fours = fours[(apart.min(axis=0) >= drawn.MARKS_APART_PX) & is_other.all(axis=0)]
-    ranks = np.array([ranks_of(one[fours]) for one in _measures_of(plain.blocks, points, rng)]).T
+    # Points less than half a millimeter apart in a measure come in an order drawn.
+    boxes, at_m = np.array([bounds_m(block) for block in plain.blocks]), points.at_m
+    off_m = np.linalg.norm((at_m - boxes.mean(axis=1)[points.on])[:, :2], axis=1)
+    gaps_m = np.maximum(boxes[:, 0] - at_m[:, None], at_m[:, None] - boxes[:, 1])[..., :2]
+    is_higher = boxes[:, 1, 2] > at_m[:, 2:] + _SAME_HEIGHT_M
+    near_m = np.where(is_higher, np.linalg.norm(gaps_m.clip(0), axis=2), 1.0).min(axis=1)
+    measures = np.array([off_m, at_m[:, 2], near_m]) + rng.random((3, len(at_m))) * 2 * SPARE_M
+    ranks = np.array([ranks_of(measure[fours]) for measure in measures]).T
     is_fit = (ranks.min(axis=1) >= 0) & (ranks[:, 0] == rank)
     if not is_fit.any():
         return [], ""
@@ -817,19 +824,6 @@ def four_of(
     kind = int(rng.choice(len(kinds), p=odds / odds.sum()))
     found: list[int] = pick(rng, fours[is_fit][of_kind.ravel() == kind]).tolist()
     return found, f"ranks {kinds[kind].tolist()}"
-
-
-def _measures_of(blocks: Sequence[Block], points: Points, rng: np.random.Generator) -> Floats:
-    """Return how far points are off the middle of their block, how high, and how far the nearest
-    block is that is higher, (3, n) [m]; points less than half a millimeter apart come in an order
-    drawn.
-    """
-    boxes, at_m = np.array([bounds_m(block) for block in blocks]), points.at_m
-    off_m = np.linalg.norm((at_m - boxes.mean(axis=1)[points.on])[:, :2], axis=1)
-    gaps_m = np.maximum(boxes[:, 0] - at_m[:, None], at_m[:, None] - boxes[:, 1])[..., :2]
-    is_higher = boxes[:, 1, 2] > at_m[:, 2:] + _SAME_HEIGHT_M
-    near_m = np.where(is_higher, np.linalg.norm(gaps_m.clip(0), axis=2), 1.0).min(axis=1)
-    return np.array([off_m, at_m[:, 2], near_m]) + rng.random((3, len(at_m))) * 2 * SPARE_M
 
 
 def _size(block: Block) -> str:

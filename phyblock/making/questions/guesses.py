@@ -70,21 +70,17 @@ def _of_pictures(
         row = [*_extent(mask), *color, float(np.sum(others)), *_extent(alone)]
         if start is not None:
             changed = changed_pixels(start, shot)
-            row += [*_extent(changed), _share_held(start, changed)]
-            row += np.abs(_colors_by_height(shot) - _colors_by_height(start)).sum(axis=1).tolist()
-            row.append(float(np.abs(_colors_by_height(shot) - _colors_by_height(start)).sum()))
+            # The share of the change's lower edge with something of the start right below it.
+            edge = changed[:-_BELOW_PX] & ~changed[_BELOW_PX:]
+            held = edge & (start.block[_BELOW_PX:] >= 0)
+            row += [*_extent(changed), float(held.sum() / max(int(edge.sum()), 1))]
+            recolored = np.abs(_colors_by_height(shot) - _colors_by_height(start))
+            row += [*recolored.sum(axis=1).tolist(), float(recolored.sum())]
             if mark is not None:
                 rows, columns = np.nonzero(changed)
                 row.append(float(np.hypot(rows - mark[0], columns - mark[1]).min(initial=SEEN_PX)))
                 row += [float(np.mean(columns) - mark[1]), float(np.mean(rows) - mark[0])]
         yield row
-
-
-def _share_held(start: Shot, changed: Mask) -> float:
-    """Return the share of a change's lower edge with something of the start right below it."""
-    edge = changed[:-_BELOW_PX] & ~changed[_BELOW_PX:]
-    held = edge & (start.block[_BELOW_PX:] >= 0)
-    return float(held.sum() / max(int(edge.sum()), 1))
 
 
 def _colors_by_height(shot: Shot) -> Floats:

@@ -25,14 +25,8 @@ from phyblock.sim.contact import GROUND, bounds_m, support_graph
 _LYING_M = 0.03
 """A half cylinder that lies on its flat face is lower than this."""
 _PAIRS_TRIED = 8
-
-
-_UNSAID: Mapping[str, Sequence[sight.Feature]] = {
-    "SH": ("color", "side", "layer", "support"),
-    "CO": ("type", "side", "layer", "support"),
-    "SI": ("color", "side"),
-}
-"""What names of blocks may speak of, by subtask."""
+_FURTHER: Sequence[sight.Feature] = ("side", "layer", "support")
+"""What names of blocks speak of besides color or type."""
 
 
 class ShapeMaker(StaticMaker):
@@ -46,7 +40,7 @@ class ShapeMaker(StaticMaker):
             shown = sight.recolored(scene, rng)
             picture = sight.goal_picture(shown, view)
             block = sight.block_of(shown.blocks, order)
-            if name := sight.drawn_name(rng, block, picture, _UNSAID["SH"]):
+            if name := sight.drawn_name(rng, block, picture, ("color", *_FURTHER)):
                 word, slots = sight.shape_word(block.type), {"block": name}
                 others = base.shuffled(rng, [one for one in sight.SHAPE_WORDS if one != word])
                 yield Asked("sh", shown, picture, slots, [word, *others[:3]], f"sh {_said(name)}")
@@ -82,7 +76,7 @@ class ColorMaker(StaticMaker):
             shown = sight.recolored(scene, rng)
             picture = sight.goal_picture(shown, view)
             two = base.shuffled(rng, sight.seen_blocks(picture, sight.NAMED))[:2]
-            named = [sight.drawn_name(rng, block, picture, _UNSAID["CO"]) for block in two]
+            named = [sight.drawn_name(rng, block, picture, ("type", *_FURTHER)) for block in two]
             said = {_said(name or "") for name in named}
             if len(two) == 2 and None not in named and said != {"most"}:
                 slots = {"block": str(named[0]), "other": str(named[1])}
@@ -139,7 +133,7 @@ class SizeMaker(StaticMaker):
                 shown = sight.with_own_colors(scene, chosen, rng)
             picture = sight.goal_picture(shown, view)
             blocks = [sight.block_of(shown.blocks, order) for order in chosen]
-            named = [sight.drawn_name(rng, block, picture, _UNSAID["SI"]) for block in blocks]
+            named = [sight.drawn_name(rng, block, picture, ("color", "side")) for block in blocks]
             if any(name is None or "highest" in name for name in named):
                 continue
             if not is_choice:

@@ -285,18 +285,6 @@ _SAME_ANGLE, _FREE_M, _ASIDE_M = 1e-4, 0.02, 0.01
 _COMPARED, _BESIDE = 6, 3
 
 
-def length_axis(block: Block) -> int:
-    """Return the level axis of the world (0 or 1) that a block's longest side runs along.
-
-    UnfairError where it stands on end, stands askew, or no side is clearly the longest.
-    """
-    sides = np.diff(bounds_m(block), axis=0)[0]
-    first, second = sorted(range(3), key=lambda axis: -sides[axis])[:2]
-    if first == 2 or sides[first] < _LONGER * sides[second] or block.euler_deg[2] % 90:
-        raise UnfairError("has no length that lies along the ground")
-    return first
-
-
 @functools.lru_cache(maxsize=4096)
 def _is_alike(block_type: BlockType, one_deg: Euler, other_deg: Euler) -> bool:
     """True if no one can tell two orientations of a type apart."""
@@ -309,7 +297,12 @@ def images(stem: str, block: Block) -> Sequence[tuple[str, Euler]]:
     it takes the block. UnfairError for a block that has no length to turn about.
     """
     if stem == "rr-axis":
-        return _tipped(block.euler_deg, length_axis(block))
+        # The level axis of the world that its longest side runs along.
+        sides = np.diff(bounds_m(block), axis=0)[0]
+        first, second = sorted(range(3), key=lambda axis: -sides[axis])[:2]
+        if first == 2 or sides[first] < _LONGER * sides[second] or block.euler_deg[2] % 90:
+            raise UnfairError("has no length that lies along the ground")
+        return _tipped(block.euler_deg, first)
     roll, pitch, yaw = block.euler_deg
     found = []
     for turn in range(0, 360, _STEP_DEG):

@@ -276,8 +276,13 @@ class Production:
             size = min(_LARGEST_ROUND, max(8, math.ceil((wanted - taken) * 1.3)))
             requests = [request(number + i) for i in range(size)]
             number += size
-            drawn = filter(None, self._workers.map(_drawn, requests))
-            fresh = [one for one in drawn if self._is_new(one)]
+            fresh = []
+            for one in filter(None, self._workers.map(_drawn, requests)):
+                if one.colorless in self._excluded:
+                    self.rejected += 1
+                elif one.form not in self._seen:
+                    self._seen.add(one.form)
+                    fresh.append(one)
             sound = self._workers.map(is_sound, [one.scene for one in fresh])
             for one, is_kept in zip(fresh, sound, strict=True):
                 if is_kept:
@@ -285,15 +290,6 @@ class Production:
                     yield one.request, one.scene
                     if taken == wanted:
                         return
-
-    def _is_new(self, one: Drawn) -> bool:
-        """True if a form is neither excluded, which is counted, nor seen before."""
-        if one.colorless in self._excluded:
-            self.rejected += 1
-            return False
-        is_new = one.form not in self._seen
-        self._seen.add(one.form)
-        return is_new
 
     def _name(self, scene: Scene) -> str:
         level = scene.levels[0]
