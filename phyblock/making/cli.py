@@ -308,7 +308,8 @@ def complete_set(data: Path, jobs: int, out: Path | None) -> None:
         (one.scene, one.offered or make_candidates(one.scene, palette=palette)) for one in whole
     ]
     command = f"phyblock scenes complete {shlex.quote(data.name)} --out {shlex.quote(folder.name)}"
-    files.write_scenes(folder, tasks, files.completed_card(folder.name, len(tasks), command))
+    card = files.card("completed", name=folder.name, count=len(tasks), command=command)
+    files.write_scenes(folder, tasks, card)
     for one in whole:
         for note in one.notes:
             click.echo(f"note: scene {one.scene.id}: {note}")

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from jinja2 import Environment, StrictUndefined
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from phyblock.data.base import VERSION_FILE
 from phyblock.data.questions import StoredQuestion
@@ -103,11 +103,15 @@ def check_sums(folder: Path) -> tuple[int, tuple[Problem, ...]]:
 # Cards
 
 
-def _card(template: str, /, **facts: object) -> str:
-    """Return a card from a Jinja template in `cards/`, filled with facts."""
-    text = (Path(__file__).parent / "cards" / f"{template}.md").read_text(encoding="utf-8")
-    environment = Environment(undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
-    return environment.from_string(text).render(simulator=other_engine(), **facts) + "\n"
+def card(template: str, /, **facts: object) -> str:
+    """Return a Markdown card from a Jinja template in `cards/`, filled with facts."""
+    loader = FileSystemLoader(Path(__file__).parent / "cards")
+    environment = Environment(
+        loader=loader, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    return (
+        environment.get_template(f"{template}.md").render(simulator=other_engine(), **facts) + "\n"
+    )
 
 
 def scene_card(name: str, tasks: _Tasks, command: str, palette: Palette, rejected: int) -> str:
@@ -130,7 +134,7 @@ def scene_card(name: str, tasks: _Tasks, command: str, palette: Palette, rejecte
         return cells
 
     by_level = {n: [one for one in scenes if n in one.levels] for n in LEVEL_LIMITS}
-    text = _card(
+    return card(
         "scenes",
         name=name,
         command=command,
@@ -144,13 +148,6 @@ def scene_card(name: str, tasks: _Tasks, command: str, palette: Palette, rejecte
         pairs=len(PALETTES[palette]),
         candidates=" to ".join(map(str, sorted({min(sizes), max(sizes)}))),
     )
-    return text + _card("scenes_file")
-
-
-def completed_card(name: str, count: int, command: str) -> str:
-    """Return the Markdown card of scenes that were completed from positions."""
-    text = _card("completed", name=name, count=count, command=command)
-    return text + _card("scenes_file")
 
 
 def question_card(
@@ -174,7 +171,7 @@ def question_card(
         most = f"{max(texts.values()) / len(some):.0%}" if is_text else ""
         shares = (f"{letters[i] / len(some):.0%}" for i in range(len(LETTERS)))
         rows.append((subtask, SUBTASK_NAMES[subtask], *counts, *shares, most))
-    return _card(
+    return card(
         "questions",
         name=name,
         scenes_name=scenes_name,

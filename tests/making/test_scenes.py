@@ -34,7 +34,7 @@ from phyblock.making.scenes.sketch import (
     transformed,
 )
 from phyblock.sim import dynamics
-from phyblock.sim.balance import is_balanced, surely_falls, surely_stands
+from phyblock.sim.balance import surely_falls, surely_stands
 from phyblock.sim.contact import bounds_m, find_gaps, find_overlaps, support_graph
 from phyblock.sim.dynamics import groups, is_proven
 from phyblock.sim.engine import installed_engines
@@ -165,7 +165,7 @@ def scenes():
         return list(Production(8, "kit", workers).scenes(SMALL))
 
 
-@given(st.integers(1, 5000), st.sets(st.integers(1, 4), min_size=1))
+@given(st.integers(1, 5000), st.sets(st.integers(1, 5), min_size=1))
 def test_shares_add_up(count, levels):
     found = shares(count, sorted(levels))
     assert sum(share.base + share.varied for share in found) == count
@@ -188,16 +188,6 @@ def test_every_scene_is_accepted_again_in_every_engine_without_its_proof(
 def test_no_two_scenes_are_the_same_and_variations_name_base_scenes(scenes):
     assert check_set(scenes) == ()
     assert any(scene.parents != (scene.id,) for scene in scenes)
-
-
-def test_great_scenes_are_within_their_level_and_stand():
-    drawn = [one for one in (draw(Request(3, "kit", "5", number)) for number in range(3)) if one]
-    assert drawn
-    for scene in drawn:
-        assert scene.levels == (5,)
-        assert 23 <= len(scene) <= 40
-        assert all(map(is_balanced, groups(scene.blocks)))
-    assert {share.group for share in shares(100, (4, 5))} == {"4", "5"}
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -149,20 +149,19 @@ class StaticMaker(Maker):
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """Yield fair questions about a scene, view by view."""
         for _ in range(_VIEWS_A_SCENE):
-            asked = self.ask(scene, drawn_view(rng), rng)
-            yield from itertools.islice(self._answered(asked, rng), _DRAFTS_A_VIEW)
-
-    def _answered(self, asked: Iterator[Asked], rng: np.random.Generator) -> Iterator[Draft]:
-        for one in asked:
-            try:
-                right = self.right(one)
-            except UnfairError:
-                continue
-            options = one.options or self.offer(one, right, rng)
-            if right in options:
-                first = tuple(right_first(right, options))
-                pictures, kind = (one.picture,), one.kind or one.stem
-                yield Draft(one.scene, one.stem, first, pictures, dict(one.slots), kind=kind)
+            found = 0
+            for one in self.ask(scene, drawn_view(rng), rng):
+                try:
+                    right = self.right(one)
+                except UnfairError:
+                    continue
+                options = one.options or self.offer(one, right, rng)
+                if right not in options:
+                    continue
+                first, kind = tuple(right_first(right, options)), one.kind or one.stem
+                yield Draft(one.scene, one.stem, first, (one.picture,), dict(one.slots), kind=kind)
+                if (found := found + 1) == _DRAFTS_A_VIEW:
+                    break
 
     def rederive(self, question: Question) -> tuple[int, ...]:
         """Return the answer from the one picture and the slots of the text alone."""

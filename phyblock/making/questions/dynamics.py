@@ -177,9 +177,23 @@ class CounterfactualMaker(Maker):
         carrying = frozenset[int]().union(*_below(scene.blocks).values())
         asked = [block.order for block in scene.blocks if block.order in carrying]
         for order in shuffled(rng, asked)[:_REMOVALS_TRIED]:
-            shown = _pictured(scene.blocks, order, rng)
-            moved = falling(group_of(scene.blocks, order), order) if shown else None
-            if shown and moved is not None and sight.are_seen(shown, moved, sight.COUNTED):
+            # From a view that shows all blocks, with the one that goes marked.
+            for _ in range(_VIEWS_TRIED):
+                plain = QuestionPicture("scene", scene.blocks, base.drawn_view(rng))
+                mark = drawn.block_mark(plain, seen(plain), order, TAKEN)
+                if (
+                    mark
+                    and sight.are_seen(plain, [order], sight.NAMED)
+                    and sight.are_seen(plain, sight.orders_of(scene.blocks), _ALL_SEEN)
+                ):
+                    break
+            else:
+                continue
+            shown, moved = (
+                replace(plain, marks=(mark,)),
+                falling(group_of(scene.blocks, order), order),
+            )
+            if moved is not None and sight.are_seen(shown, moved, sight.COUNTED):
                 right, *others = base.right_first(_outcome_text(len(moved)), OUTCOME_TEXTS)
                 options = (right, *shuffled(rng, others))
                 facts = {"removed": order, "moved": sorted(moved)}
@@ -256,22 +270,6 @@ def _joined(lots: Sequence[Lot], most: int, enough: int | None = None) -> set[Lo
         if enough is not None and len(found) > enough:
             break
     return found
-
-
-def _pictured(
-    blocks: tuple[Block, ...], order: int, rng: np.random.Generator
-) -> QuestionPicture | None:
-    """Return the blocks from a view that shows them all, with the one that goes marked."""
-    for _ in range(_VIEWS_TRIED):
-        plain = QuestionPicture("scene", blocks, base.drawn_view(rng))
-        mark = drawn.block_mark(plain, seen(plain), order, TAKEN)
-        if (
-            mark
-            and sight.are_seen(plain, [order], sight.NAMED)
-            and sight.are_seen(plain, sight.orders_of(blocks), _ALL_SEEN)
-        ):
-            return replace(plain, marks=(mark,))
-    return None
 
 
 def _by_colors(

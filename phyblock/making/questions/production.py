@@ -23,23 +23,9 @@ import numpy as np
 from phyblock.domain.question import LETTERS, Mark, Question, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
 from phyblock.errors import DataError, PhyblockError, Problem
+from phyblock.making.questions import dynamics, properties, relations, views
 from phyblock.making.questions.base import Draft, Maker, pick, shuffled
-from phyblock.making.questions.dynamics import AffordanceMaker, CounterfactualMaker, PredictiveMaker
 from phyblock.making.questions.guesses import keeping_odds, measures_of
-from phyblock.making.questions.properties import (
-    ColorMaker,
-    NumberMaker,
-    ShapeMaker,
-    SizeMaker,
-    TallyMaker,
-)
-from phyblock.making.questions.relations import (
-    DependencyMaker,
-    DistanceMaker,
-    PositionMaker,
-    RotationMaker,
-)
-from phyblock.making.questions.views import OrderingMaker, ViewpointMaker
 from phyblock.sim.question_pictures import filled
 from phyblock.types import BACKGROUNDS, Background
 from phyblock.workers import Workers
@@ -47,10 +33,12 @@ from phyblock.workers import Workers
 MAKERS: dict[Subtask, Maker] = {
     maker.subtask: maker
     for maker in (
-        *(ShapeMaker(), ColorMaker(), SizeMaker(), NumberMaker()),
-        *(PositionMaker(), DistanceMaker(), DependencyMaker(), RotationMaker()),
-        *(TallyMaker("OC"), TallyMaker("LC"), TallyMaker("TC"), ViewpointMaker()),
-        *(CounterfactualMaker(), PredictiveMaker(), OrderingMaker(), AffordanceMaker()),
+        *(properties.ShapeMaker(), properties.ColorMaker(), properties.SizeMaker()),
+        *(properties.NumberMaker(), relations.PositionMaker(), relations.DistanceMaker()),
+        *(relations.DependencyMaker(), relations.RotationMaker()),
+        *(properties.TallyMaker("OC"), properties.TallyMaker("LC"), properties.TallyMaker("TC")),
+        *(views.ViewpointMaker(), dynamics.CounterfactualMaker(), dynamics.PredictiveMaker()),
+        *(views.OrderingMaker(), dynamics.AffordanceMaker()),
     )
 }
 """The makers of questions, by subtask; plugins add theirs."""
@@ -92,7 +80,13 @@ def make_questions(
         if len(taken) < count:
             message = f"the scenes give no more than {len(taken)} of {count} questions"
             short.append(Problem(subtask, message, hint="ask for fewer, or give more scenes"))
-        questions += _dealt(subtask, taken, rng)
+        # In an order drawn, with letters that are drawn and about as often right.
+        width, letters = max(3, len(str(len(taken)))), even_letters(len(taken), rng)
+        for number, (one, right) in enumerate(zip(shuffled(rng, taken), letters, strict=True), 1):
+            rest = shuffled(rng, [place for place in _PLACES if place != right])
+            places = shuffled(rng, _PLACES) if subtask == "OR" else [right, *rest]
+            name = f"{subtask.lower()}-{number:0{width}d}"
+            questions.append(as_question(name, subtask, one, places, pick(rng, BACKGROUNDS)))
     if short:
         raise DataError(short)
     return questions
@@ -124,19 +118,6 @@ def _by_levels(scenes: Sequence[Scene], rng: np.random.Generator) -> list[Scene]
         by_level.setdefault(scene.level, []).append(scene)
     turns = [(i, level) for level, group in by_level.items() for i in range(len(group))]
     return [by_level[level][i] for i, level in sorted(turns)]
-
-
-def _dealt(
-    subtask: Subtask, taken: Sequence[Draft], rng: np.random.Generator
-) -> Iterator[Question]:
-    """Yield questions in an order drawn, with letters that are drawn and about as often right."""
-    width = max(3, len(str(len(taken))))
-    letters = even_letters(len(taken), rng)
-    for number, (one, right) in enumerate(zip(shuffled(rng, taken), letters, strict=True), 1):
-        rest = shuffled(rng, [place for place in _PLACES if place != right])
-        places = shuffled(rng, _PLACES) if subtask == "OR" else [right, *rest]
-        name = f"{subtask.lower()}-{number:0{width}d}"
-        yield as_question(name, subtask, one, places, pick(rng, BACKGROUNDS))
 
 
 def as_question(
@@ -220,7 +201,16 @@ BALANCE = (0.22, 0.28)
 
 def select(pool: Sequence[Draft], count: int, rng: np.random.Generator) -> list[Draft]:
     """Return at most `count` drafts, no two of one view, or the same question of base scenes."""
-    every = _spread(pool, count, rng)
+    # Of each kind, one of each scene in turns, several times those wanted.
+    turns: dict[str, list[tuple[int, int]]] = defaultdict(list)
+    of_scene: Counter[tuple[str, str]] = Counter()
+    for i in rng.permutation(len(pool)).tolist():
+        about = (pool[i].group, pool[i].scene.id)
+        of_scene[about] += 1
+        turns[pool[i].group].append((of_scene[about], i))
+    spread = -(-_SPREAD * count // max(len(turns), 1))
+    ranked = (sorted(group, key=lambda entry: entry[0])[:spread] for group in turns.values())
+    every = [pool[i] for group in ranked for _, i in group]
     rank = rng.random(len(every)) / np.maximum(keeping_odds(every), 1e-9)
     most = max(int((rank <= 1).sum()), round(_SPARE * count))
     left, rest = (
@@ -252,19 +242,6 @@ def select(pool: Sequence[Draft], count: int, rng: np.random.Generator) -> list[
             known.update(_identities(chosen))
             counts.update((group, member) for group, member, _ in _even(chosen))
     return taken
-
-
-def _spread(pool: Sequence[Draft], count: int, rng: np.random.Generator) -> list[Draft]:
-    """Return drafts of each kind, one of each scene in turns, several times those wanted."""
-    turns: dict[str, list[tuple[int, int]]] = defaultdict(list)
-    of_scene: Counter[tuple[str, str]] = Counter()
-    for i in rng.permutation(len(pool)).tolist():
-        about = (pool[i].group, pool[i].scene.id)
-        of_scene[about] += 1
-        turns[pool[i].group].append((of_scene[about], i))
-    most = -(-_SPREAD * count // max(len(turns), 1))
-    ranked = (sorted(group, key=lambda entry: entry[0])[:most] for group in turns.values())
-    return [pool[i] for group in ranked for _, i in group]
 
 
 def _even(draft: Draft) -> Iterator[tuple[Hashable, Hashable, float]]:

@@ -7,6 +7,7 @@ tells.
 
 from __future__ import annotations
 
+import functools
 import itertools
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
@@ -47,8 +48,7 @@ class ShapeMaker(StaticMaker):
 
     def right(self, asked: Asked) -> str:
         """Return the shape of the block that the text names."""
-        block = sight.resolve_one(asked.slots["block"], asked.picture)
-        sight.require_seen(asked.picture, sight.STUDIED, [block])
+        (block,) = sight.resolve_seen([asked.slots["block"]], asked.picture, sight.STUDIED)
         if not sight.shows_profile(block, asked.picture.view_deg):
             raise UnfairError("is seen from a side that does not tell its shape")
         is_standing = block.type == "semi_cylinder" and sight.height_m(block) > _LYING_M
@@ -85,10 +85,8 @@ class ColorMaker(StaticMaker):
 
     def right(self, asked: Asked) -> str:
         """Return the colors of the blocks that the text names."""
-        blocks = [
-            sight.resolve_one(asked.slots[name], asked.picture) for name in ("block", "other")
-        ]
-        sight.require_seen(asked.picture, sight.NAMED, blocks)
+        texts = [asked.slots[name] for name in ("block", "other")]
+        blocks = sight.resolve_seen(texts, asked.picture)
         return " and ".join(block.color for block in blocks)
 
     def offer(self, asked: Asked, right: str, rng: np.random.Generator) -> Sequence[str]:
@@ -147,8 +145,7 @@ class SizeMaker(StaticMaker):
         """Compare the blocks that the text or the options name."""
         is_choice, pair = "comparison" in asked.slots, ("block", "other")
         named = asked.options if is_choice else [asked.slots[name] for name in pair]
-        blocks = [sight.resolve_one(name, asked.picture) for name in named]
-        sight.require_seen(asked.picture, sight.STUDIED, blocks)
+        blocks = sight.resolve_seen(named, asked.picture, sight.STUDIED)
         if not is_choice:
             ratio = sight.height_m(blocks[0]) / sight.height_m(blocks[1])
             right = [word for word, known in _TIMES.items() if abs(ratio - known) < _EXACT]
@@ -231,16 +228,8 @@ def sure_blocks(picture: QuestionPicture) -> int:
     return len(picture.blocks)
 
 
-def _all(picture: QuestionPicture) -> Sequence[Block]:
-    """Return the blocks, each of which shows enough to be counted; else UnfairError."""
-    sight.require_seen(picture, sight.COUNTED)
-    return picture.blocks
-
-
-def _shaped(picture: QuestionPicture) -> Sequence[Block]:
-    """Return the blocks, each of which shows its shape; else UnfairError."""
-    sight.require_shapes_seen(picture)
-    return picture.blocks
+_all = functools.partial(sight.require_seen, least=sight.COUNTED)
+_shaped = sight.require_shapes_seen
 
 
 def _on_ground(blocks: Sequence[Block]) -> list[Block]:
@@ -253,8 +242,7 @@ def _types(blocks: Sequence[Block]) -> Counter[str]:
 
 
 def _layer_of_block(picture: QuestionPicture, slots: Slots) -> int:
-    block = sight.resolve_one(slots["block"], picture)
-    sight.require_seen(picture, sight.NAMED, [block])
+    (block,) = sight.resolve_seen([slots["block"]], picture)
     sight.require_supports_seen(picture, [block])
     return layers_of(picture.blocks)[block.order]
 

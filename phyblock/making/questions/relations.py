@@ -45,13 +45,6 @@ def _pairs(items: Sequence[T], rng: np.random.Generator) -> list[tuple[T, T]]:
     return base.shuffled(rng, list(itertools.permutations(items, 2)))[:3]
 
 
-def _resolved(picture: QuestionPicture, names: Sequence[str]) -> list[Block]:
-    """Return the blocks of these names, each of which shows enough of itself."""
-    blocks = [sight.resolve_one(name, picture) for name in names]
-    sight.require_seen(picture, sight.NAMED, blocks)
-    return blocks
-
-
 def _top_m(block: Block) -> float:
     """Return the height of a block's highest point above the ground [m]."""
     return float(bounds_m(block)[1, 2])
@@ -95,10 +88,12 @@ class PositionMaker(StaticMaker):
     def right(self, asked: Asked) -> str:
         """Compare the places of the blocks that the text or the options name."""
         if asked.stem in _PLACES:
-            one, other = _resolved(asked.picture, (asked.slots["block"], asked.slots["other"]))
+            one, other = sight.resolve_seen(
+                (asked.slots["block"], asked.slots["other"]), asked.picture
+            )
             place = _place(asked.stem, one, other, asked.picture.view_deg)
             return _PLACES[asked.stem][place]
-        four = _resolved(asked.picture, asked.options)
+        four = sight.resolve_seen(asked.options, asked.picture)
         if asked.stem == "rp-extreme":
             extreme = asked.slots["extreme"]
             found = sight.outermost(four, asked.picture, to_left=extreme == _SIDES[0])
@@ -106,7 +101,7 @@ class PositionMaker(StaticMaker):
                 raise UnfairError(f"two blocks are about the {extreme}")
             return asked.options[four.index(found)]
         if asked.stem == "rp-nearest":
-            (anchor,) = _resolved(asked.picture, (asked.slots["other"],))
+            (anchor,) = sight.resolve_seen((asked.slots["other"],), asked.picture)
             middle = sight.center_m(anchor)
             reach = [float(np.linalg.norm(sight.center_m(b) - middle)) for b in four]
             is_clear = min(reach) <= _NEARER * sorted(reach)[1]
@@ -213,7 +208,7 @@ class DistanceMaker(StaticMaker):
         """Measure between the blocks that the text names."""
         picture, slots = asked.picture, asked.slots
         names = ("block",) if asked.stem in _HEIGHTS else ("block", "other")
-        blocks = _resolved(picture, [slots[name] for name in names])
+        blocks = sight.resolve_seen([slots[name] for name in names], picture)
         sight.require_supports_seen(picture, blocks)
         if not any(one.type in _SCALES for one in sight.seen_blocks(picture, sight.NAMED)):
             raise UnfairError("no block that gives the scale can be seen")
@@ -260,7 +255,7 @@ class DependencyMaker(StaticMaker):
 
     def right(self, asked: Asked) -> str:
         """Find the contacts of the blocks that the text and the options name."""
-        anchor, *four = _resolved(asked.picture, (asked.slots["block"], *asked.options))
+        anchor, *four = sight.resolve_seen((asked.slots["block"], *asked.options), asked.picture)
         if asked.stem not in _RELATIONS or anchor in four:
             raise UnfairError("asks about no dependency, or a block about itself")
         below = support_graph(asked.picture.blocks)
@@ -384,8 +379,8 @@ class RotationMaker(StaticMaker):
 
     def right(self, asked: Asked) -> str:
         """Compare the orientations in the picture, up to the symmetry of the type."""
-        pair = [sight.resolve_one(asked.slots[name], asked.picture) for name in ("block", "other")]
-        sight.require_seen(asked.picture, sight.STUDIED, pair)
+        texts = [asked.slots[name] for name in ("block", "other")]
+        pair = sight.resolve_seen(texts, asked.picture, sight.STUDIED)
         true = {phrase for phrase in phrases(asked.stem, *pair) if phrase in asked.options}
         if len(true) != 1:
             raise UnfairError("are not of one type, or not turned as the wording asks")

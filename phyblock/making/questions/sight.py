@@ -156,11 +156,15 @@ def are_seen(picture: QuestionPicture, orders: Collection[int], least: float) ->
 
 def require_seen(
     picture: QuestionPicture, least: float, blocks: Sequence[Block] | None = None
-) -> None:
-    """Raise UnfairError that names those of the blocks, or of all, that show less than `least`."""
-    orders = set(orders_of(picture.blocks if blocks is None else blocks))
-    if hidden := sorted(orders.difference(orders_of(seen_blocks(picture, least)))):
+) -> Sequence[Block]:
+    """Return some blocks, or all. Raises UnfairError that names those that show less than `least`
+    of themselves.
+    """
+    blocks = picture.blocks if blocks is None else blocks
+    shown = orders_of(seen_blocks(picture, least))
+    if hidden := sorted(set(orders_of(blocks)).difference(shown)):
         raise UnfairError(f"blocks {hidden} show less than {least:.0%} of themselves")
+    return blocks
 
 
 Below = Mapping[int, frozenset[int]]
@@ -185,8 +189,8 @@ def require_supports_seen(picture: QuestionPicture, blocks: Sequence[Block]) -> 
     require_seen(picture, COUNTED, [block for block in picture.blocks if block.order in under])
 
 
-def require_shapes_seen(picture: QuestionPicture) -> None:
-    """Raise UnfairError unless every block shows enough of itself to tell its shape."""
+def require_shapes_seen(picture: QuestionPicture) -> Sequence[Block]:
+    """Return the blocks. Raises UnfairError unless each shows enough to tell its shape."""
     require_seen(picture, _SHAPED)
     if not all(shows_profile(block, picture.view_deg) for block in picture.blocks):
         raise UnfairError("some block is seen from a side that does not tell its shape")
@@ -194,6 +198,7 @@ def require_shapes_seen(picture: QuestionPicture) -> None:
     small = [order for order, area in sorted(areas.items()) if area < _SHAPED_AREA]
     if small:
         raise UnfairError(f"blocks {small} cover less than {_SHAPED_AREA:.1%} of the picture")
+    return picture.blocks
 
 
 def outermost(blocks: Sequence[Block], picture: QuestionPicture, to_left: bool) -> Block | None:
@@ -375,6 +380,17 @@ def resolve_one(text: str, picture: QuestionPicture) -> Block:
     if resolve(text, picture, loosely=True) != orders:
         raise UnfairError(f"{text!r} may be taken for another block")
     return block_of(picture.blocks, orders[0])
+
+
+def resolve_seen(
+    texts: Sequence[str], picture: QuestionPicture, least: float = NAMED
+) -> list[Block]:
+    """Return the blocks that expressions fit, each of which shows so much of itself; UnfairError
+    otherwise.
+    """
+    blocks = [resolve_one(text, picture) for text in texts]
+    require_seen(picture, least, blocks)
+    return blocks
 
 
 def names(block: Block, picture: QuestionPicture, features: Sequence[Feature]) -> tuple[str, ...]:

@@ -165,11 +165,15 @@ def read_given(path: Path) -> tuple[ReadScene, ...]:
     files = sorted(path.iterdir()) if path.is_dir() else [path]
     for file in (one for one in files if one.is_file() and one.suffix in _SUFFIXES):
         try:
-            for one in _read(file):
-                if earlier := scenes.get(one.name):
+            for given, called, where in _read(file):
+                name = given.id or called
+                if given.id is None and not re.fullmatch(NAME, name):
+                    message, hint = "has no id, and cannot be called as its file", "give it an id"
+                    raise DataError(Problem(where, message, "id", name, NAME_ALLOWED, hint))
+                if earlier := scenes.get(name):
                     message = f"is used by {earlier.where} already"
-                    problems.append(Problem(one.where, message, "id", one.name))
-                scenes[one.name] = one
+                    problems.append(Problem(where, message, "id", name))
+                scenes[name] = ReadScene(name, given, where)
         except (DataError, SpecError) as error:
             problems += error.problems
     if not scenes and not problems:
@@ -180,12 +184,13 @@ def read_given(path: Path) -> tuple[ReadScene, ...]:
     return tuple(scenes[name] for name in sorted(scenes))
 
 
-def _read(file: Path) -> Iterator[ReadScene]:
+def _read(file: Path) -> Iterator[tuple[GivenScene, str, str]]:
+    """Yield each scene of a file, a name by the file, and where it stands."""
     if file.suffix == ".jsonl":
         adapter = TypeAdapter(GivenScene)
         for number, line in enumerate(read_data(file, _ALLOWED).splitlines(), 1):
             where = f"{file}:{number}"
-            yield _named(decode(adapter, line, where, GivenScene), f"{file.stem}-{number}", where)
+            yield decode(adapter, line, where, GivenScene), f"{file.stem}-{number}", where
         return
     source = read_yaml(file, may_hold_keys=True)
     data: Any = source.data
@@ -196,11 +201,4 @@ def _read(file: Path) -> Iterator[ReadScene]:
     for number, raw in enumerate(data if is_list else [data]):
         name = f"{file.stem}-{number + 1}" if is_list else file.stem
         here = (*at, number) if is_list else at
-        yield _named(validated(GivenScene, raw, source, here), name, source.where(here))
-
-
-def _named(given: GivenScene, name: str, where: str) -> ReadScene:
-    if given.id is None and not re.fullmatch(NAME, name):
-        message, hint = "has no id, and cannot be called as its file", "give it an id"
-        raise DataError(Problem(where, message, "id", name, NAME_ALLOWED, hint))
-    return ReadScene(given.id or name, given, where)
+        yield validated(GivenScene, raw, source, here), name, source.where(here)

@@ -39,9 +39,6 @@ from phyblock.sim.contact import find_gaps
 from phyblock.text import drawn_bytes
 from phyblock.workers import Workers
 
-Source = tuple[int, tuple[str, ...]]
-"""A number of parents of a variation, and the groups that they are drawn from."""
-
 
 class Group(NamedTuple):
     """What is asked of the scenes of a group, and what they are made from (`groups.yaml`)."""
@@ -51,7 +48,7 @@ class Group(NamedTuple):
     base: int
     varied: int
     themes: tuple[str, ...]
-    sources: tuple[Source, ...]
+    sources: tuple[tuple[int, tuple[str, ...]], ...]
 
 
 GROUPS: dict[str, Group] = {
@@ -321,44 +318,41 @@ def split_tasks(
     the rules give no scene that is not `excluded`.
     """
     barred = builtin_forms() | excluded
-    for number in itertools.count(first, step):
-        scene = _streamed(split, f"{split}/{seed}/{number}", tuple(levels), palette, barred)
-        yield AssemblyTask(scene, make_candidates(scene, palette=PALETTES[palette]))
-
-
-def _streamed(
-    split: Split, salt: str, levels: tuple[int, ...], palette: Palette, barred: Set[bytes]
-) -> Scene:
-    rng = np.random.default_rng(int.from_bytes(drawn_bytes(salt)[:16], "big"))
     parts = [(share, part) for share in shares(10_000, levels) for part in (0, 1)]
     weights = np.array([(share.base, share.varied)[part] for share, part in parts])
+    for number in itertools.count(first, step):
+        rng = np.random.default_rng(
+            int.from_bytes(drawn_bytes(f"{split}/{seed}/{number}")[:16], "big")
+        )
 
-    def base(group: str) -> Request:
-        return Request(int(rng.integers(2**62)), palette, group, int(rng.integers(2**31)))
+        def base(group: str, rng: np.random.Generator = rng) -> Request:
+            return Request(int(rng.integers(2**62)), palette, group, int(rng.integers(2**31)))
 
-    for _ in range(_LONGEST_SEARCH):
-        share, is_varied = parts[int(rng.choice(len(parts), p=weights / weights.sum()))]
-        made = base(share.group)
-        parents: list[Drawn] = []
-        if is_varied:
-            found = GROUPS[share.group].sources
-            count, groups = found[int(rng.integers(len(found)))]
-            sources = [base(groups[int(rng.integers(len(groups)))]) for _ in range(count)]
-            parents = [one for one in map(_drawn, sources) if one is not None]
-            if len(parents) < count:
-                continue
-            made = replace(made, parents=tuple(sources))
-        one = _drawn(made)
-        for each in (*parents, *([one] if one else ())):
-            if each.colorless in barred or (each.colorless[0] < _DEV_BELOW) != (split == "dev"):
-                break
-        else:
-            if one is not None and is_acceptable(one.scene, PALETTES[palette]):
+        for _ in range(_LONGEST_SEARCH):
+            share, is_varied = parts[int(rng.choice(len(parts), p=weights / weights.sum()))]
+            made = base(share.group)
+            parents: list[Drawn] = []
+            if is_varied:
+                found = GROUPS[share.group].sources
+                count, groups = found[int(rng.integers(len(found)))]
+                sources = [base(groups[int(rng.integers(len(groups)))]) for _ in range(count)]
+                parents = [one for one in map(_drawn, sources) if one is not None]
+                if len(parents) < count:
+                    continue
+                made = replace(made, parents=tuple(sources))
+            one = _drawn(made)
+            drawn = (*parents, *([one] if one else ()))
+            is_fit = not any(
+                each.colorless in barred or (each.colorless[0] < _DEV_BELOW) != (split == "dev")
+                for each in drawn
+            )
+            if one is not None and is_fit and is_acceptable(one.scene, PALETTES[palette]):
                 names = tuple(dict.fromkeys(f"{p.scene.id}-{p.form.hex()[:12]}" for p in parents))
                 name = f"{one.scene.id}-{one.form.hex()[:12]}"
-                return replace(one.scene, id=name, parents=names or (name,))
-    message, hint = (
-        f"none new in {_LONGEST_SEARCH} tries",
-        "ask for other levels, or for palette full",
-    )
-    raise DataError(Problem(f"split {split}", message, hint=hint))
+                scene = replace(one.scene, id=name, parents=names or (name,))
+                yield AssemblyTask(scene, make_candidates(scene, palette=PALETTES[palette]))
+                break
+        else:
+            message = f"none new in {_LONGEST_SEARCH} tries"
+            hint = "ask for other levels, or for palette full"
+            raise DataError(Problem(f"split {split}", message, hint=hint))
