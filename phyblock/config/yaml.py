@@ -286,9 +286,10 @@ class _Walker:
     def _scalar(self, node: yaml.ScalarNode, kind: str, path: FieldPath) -> Any:
         text = self._text(node, path)
         lower = text.lower()
-        if kind in ("int", "float") and len(text) > _LONGEST_NUMBER:
-            raise self._error(node, path, "is a number that is too large", f"{len(text):,} digits")
         if kind in ("int", "float"):
+            if len(text) > _LONGEST_NUMBER:
+                found = f"{len(text):,} digits"
+                raise self._error(node, path, "is a number that is too large", found)
             with contextlib.suppress(ValueError):
                 if kind == "int":
                     return int(lower, {"0o": 8, "0x": 16}.get(lower[:2], 10))

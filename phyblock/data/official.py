@@ -24,7 +24,7 @@ from pydantic import Field, TypeAdapter
 
 from phyblock.config.validation import Fault, checked, form
 from phyblock.config.yaml import shown
-from phyblock.data.base import Dataset, QuestionSet, QuestionTask, read_data, read_each, report
+from phyblock.data.base import Dataset, QuestionSet, QuestionTask, read_data, read_each
 from phyblock.data.questions import Options
 from phyblock.data.scenes import (
     NAME,
@@ -207,7 +207,8 @@ def _pictures_of(name: str, line: _Question, folder: Path, where: str) -> dict[s
         if path := next((path for path in paths if path.is_file()), None):
             files[label] = path
         elif label != "scene":
-            report([Fault("the file is missing", str(paths[0]), at=("options",))], where)
+            message, allowed = "the file is missing", str(paths[0])
+            raise DataError(Problem(where, message, "options", allowed=allowed))
     return files
 
 
@@ -226,8 +227,8 @@ def _answer_of(line: _Question, subtask: Subtask, where: str) -> tuple[int, ...]
             answer.append(line.options.index(text))
     if not len(set(answer)) == len(parts) == (len(LETTERS) if is_order else 1):
         allowed = "all four letters or options" if is_order else "a letter or an option"
-        fault = Fault("is none of the options", allowed, shown(line.answer), ("answer",))
-        report([fault], where)
+        message, found = "is none of the options", shown(line.answer)
+        raise DataError(Problem(where, message, "answer", found, allowed))
     return tuple(answer)
 
 

@@ -51,60 +51,47 @@ class Broken:
         return f"law {self.law}: {self.kind}"
 
 
-@dataclass(frozen=True)
-class Ended:
-    """The end of a command: code None where it hung, negative where a signal ended the process.
-
-    `deeds` are changes to files and connections, each an event and what it is about.
-    """
+class Ended(NamedTuple):
+    """The end of a command: code None where it hung, negative where a signal ended the process."""
 
     code: int | None
-    out: str
-    err: str
-    deeds: tuple[tuple[str, str], ...]
+    out: str = ""
+    err: str = ""
 
 
-def run_watched(
-    args: Sequence[str], folder: Path, env: Mapping[str, str], longest_s: float = _LONGEST_S
-) -> Ended:
-    """Run a command to its end, or for its longest time."""
+def watched(
+    args: Sequence[str],
+    folder: Path,
+    env: Mapping[str, str],
+    may_write: Sequence[str],
+    lasting: Sequence[str] = (),
+    longest_s: float = _LONGEST_S,
+) -> tuple[Ended, list[Broken]]:
+    """Run a command to its end, or for its longest time; return its end and the laws it broke.
+
+    `may_write` are the paths in the folder that the command is to write in, and `lasting` those of
+    the user's files that stand there all the same.
+    """
+    before, lines = _tree(folder), _whole_lines(folder)
+    ended = Ended(None)
     with tempfile.TemporaryFile() as file:
-        code, out, err = None, "", ""
         with contextlib.suppress(subprocess.TimeoutExpired):
             done = run_forked(args, folder, env, timeout_s=longest_s, deeds=file)
-            code, out, err = done.code, done.out, done.err
+            ended = Ended(done.code, done.out, done.err)
         file.seek(0)
-        return Ended(code, out, err, tuple(tuple(json.loads(line)) for line in file))
-
-
-class Watch:
-    """Looks at a folder before a command and after it.
-
-    `may_write` are the paths in it that the command is to write in, and `lasting` those of the
-    user's files that stand there all the same.
-    """
-
-    def __init__(self, root: Path, may_write: Sequence[str], lasting: Sequence[str] = ()) -> None:
-        self._root, self._may_write, self._lasting = root, may_write, lasting
-        self._tree, self._lines = _tree(root), _whole_lines(root)
-
-    def broken(self, ended: Ended) -> list[Broken]:
-        """Every law that a command broke since the last look."""
-        before, after = self._tree, _tree(self._root)
-        lines, kept = self._lines, _whole_lines(self._root)
-        self._tree, self._lines = after, kept
-        found = list(_ending_broken(ended))
-        for path in sorted(before.keys() | after.keys()):
-            same = before.get(path) == after.get(path)
-            if not same and (path in self._lasting or not _lies_in(path, self._may_write)):
-                kind = "changed" if path in before else "made"
-                found.append(Broken(2, f"a file was {kind if path in after else 'deleted'}", path))
-        places = [os.path.realpath(self._root / place) for place in self._may_write]
-        found += [broken for deed in ended.deeds for broken in _judge(*deed, places)]
-        for name, line in lines - kept:
-            detail = line[:300].decode("utf-8", "replace")
-            found.append(Broken(3, f"a line of {Path(name).name} is lost", detail))
-        return found
+        deeds = [json.loads(line) for line in file]
+    found, after = list(_ending_broken(ended)), _tree(folder)
+    for path in sorted(before.keys() | after.keys()):
+        same = before.get(path) == after.get(path)
+        if not same and (path in lasting or not _lies_in(path, may_write)):
+            kind = "changed" if path in before else "made"
+            found.append(Broken(2, f"a file was {kind if path in after else 'deleted'}", path))
+    places = [os.path.realpath(folder / place) for place in may_write]
+    found += [broken for deed in deeds for broken in _judge(*deed, places)]
+    for name, line in lines - _whole_lines(folder):
+        detail = line[:300].decode("utf-8", "replace")
+        found.append(Broken(3, f"a line of {Path(name).name} is lost", detail))
+    return ended, found
 
 
 def _tree(root: Path) -> dict[str, tuple[str, str]]:
@@ -159,27 +146,16 @@ def _whole_lines(folder: Path) -> Counter[tuple[str, bytes]]:
 
 
 @dataclass(frozen=True)
-class Fifo:
-    """A pipe that nobody writes to."""
-
-
-@dataclass(frozen=True)
-class Link:
-    """A symbolic link."""
-
-    to: str
-
-
-@dataclass(frozen=True)
 class Case:
-    """A command line and what stands in the folder where it is given.
+    """A command line and what stands in the folder where it is given: bytes in a file, a text that
+    a link points to, or None for a pipe that nobody writes to.
 
     `may_write` are the paths that the command is to write in, beside cache and scratch folder;
     `lasting` those of the user's files that stand there and must not change.
     """
 
     args: tuple[str, ...]
-    files: Mapping[str, bytes | Fifo | Link] = field(default_factory=dict)
+    files: Mapping[str, bytes | str | None] = field(default_factory=dict)
     may_write: tuple[str, ...] = ()
     lasting: tuple[str, ...] = ()
 
@@ -204,13 +180,12 @@ class Bench:
             (self._folder / "tmp").mkdir()
             for name, content in case.files.items():
                 _put(self._folder / name, content)
-            watch = Watch(self._folder, (*case.may_write, *self._places), case.lasting)
             env = Workspace(self._folder, self._pictures).env
-            ended = run_watched(
-                case.args, self._folder, {**env, "TMPDIR": str(self._folder / "tmp")}
-            )
+            env = {**env, "TMPDIR": str(self._folder / "tmp")}
+            places = (*case.may_write, *self._places)
+            ended, found = watched(case.args, self._folder, env, places, case.lasting)
             self.tally["hangs" if ended.code is None else f"code {ended.code}"] += 1
-            for broken in watch.broken(ended):
+            for broken in found:
                 known = self.found.get(broken.name)
                 if known is None or len(repr(case)) < len(repr(known[0])):
                     self.found[broken.name] = case, broken
@@ -226,13 +201,13 @@ class Bench:
         return "\n".join(lines)
 
 
-def _put(path: Path, content: bytes | Fifo | Link) -> None:
+def _put(path: Path, content: bytes | str | None) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     path.unlink(missing_ok=True)
-    if isinstance(content, Fifo):
+    if content is None:
         os.mkfifo(path)
-    elif isinstance(content, Link):
-        path.symlink_to(content.to)
+    elif isinstance(content, str):
+        path.symlink_to(content)
     else:
         path.write_bytes(content)
 

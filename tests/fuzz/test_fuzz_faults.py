@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 from phyblock.errors import RetryableError, SampleError
 from phyblock.models.costs import Budget
 from phyblock.records.record import Reply
-from tests.fuzz.laws import LedgerAgent, LedgerChat, Watch, run_watched
+from tests.fuzz.laws import LedgerAgent, LedgerChat, watched
 from tests.fuzz.strategies import FAULTS, SEED, fuzzed
 from tests.models.factory import (
     QUICK,
@@ -75,10 +75,10 @@ def prepare(workspace, url, track, transport, seeds):
 def run(workspace, *args):
     """Run the suite of a workspace, which holds the laws of commands."""
     shared = [str((workspace.cache / name).resolve()) for name in SHARED]
-    watch = Watch(workspace.root, (workspace.out.name, "cache", *shared))
+    places = (workspace.out.name, "cache", *shared)
     words = ["run", "suite.yaml", "--out", str(workspace.out), "--no-report", "--yes", *args]
-    ended = run_watched(words, workspace.root, workspace.env, _LONGEST_S)
-    holds(watch.broken(ended))
+    ended, broken = watched(words, workspace.root, workspace.env, places, longest_s=_LONGEST_S)
+    holds(broken)
     return ended
 
 
