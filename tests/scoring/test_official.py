@@ -11,43 +11,34 @@ from phyblock.domain.question import CATEGORIES
 from phyblock.domain.scene import Plan
 from phyblock.parsing.plan import parse_plan
 from phyblock.results.paper import published_table
-from phyblock.scoring.plan import AssemblyScorer, Counts, Goal, chance, match_plan
+from phyblock.scoring.plan import AssemblyScorer, Goal, chance, match_plan
 from phyblock.scoring.steps import Assembly, gated
 from phyblock.types import GATINGS, SETTINGS
 from tests.shipped import DATA, official_tasks, reply_texts
 from tests.workspace import csv_rows
 
 
-@pytest.fixture(scope="module")
-def tasks(official_checkout):
-    return {task.scene.id: task for task in official_tasks(official_checkout)}
-
-
-def scored(checkout, tasks):
-    scorers = {
-        name: AssemblyScorer(task.scene, task.candidates, SETTINGS) for name, task in tasks.items()
-    }
-    for (model, scene), text in reply_texts(checkout).items():
-        plan = parse_plan(text, len(tasks[scene].candidates), "official").plan
-        for score in scorers[scene].score(plan, ["paper"], "membership"):
-            level = 1 if score.criterion == "membership" else tasks[scene].scene.level
-            counts = Counts(score.tp, score.fp, score.fn)
-            row = (model, scene, score.setting, score.criterion)
-            yield row, (level, counts.tp, counts.fp, counts.fn)
-
-
-def test_known_counts_match_row_for_row(official_dir, official_checkout, tasks):
-    path = official_dir / "expected" / "assembly_counts.csv"
-    expected = {
+def test_known_counts_match_row_for_row(official_dir, official_checkout):
+    known = {
         (row["model"], row["scene"], row["setting"], row["criterion"]): tuple(
             int(row[column]) for column in ("level", "tp", "fp", "fn")
         )
-        for row in csv_rows(path)
+        for row in csv_rows(official_dir / "expected" / "assembly_counts.csv")
     }
-    models = {model for model, *_ in expected}
-    found = dict(scored(official_checkout, tasks))
-    assert {row: counts for row, counts in found.items() if row[0] in models} == expected
-    assert len(expected) >= 6250
+    assert len(known) >= 6250
+    models = {model for model, *_ in known}
+    tasks = {task.scene.id: task for task in official_tasks(official_checkout)}
+    scorers = {
+        name: AssemblyScorer(task.scene, task.candidates, SETTINGS) for name, task in tasks.items()
+    }
+    found = {}
+    for (model, scene), text in reply_texts(official_checkout).items():
+        plan = parse_plan(text, len(tasks[scene].candidates), "official").plan
+        for score in scorers[scene].score(plan, ["paper"], "membership"):
+            level = 1 if score.criterion == "membership" else tasks[scene].scene.level
+            row = (model, scene, score.setting, score.criterion)
+            found[row] = (level, score.tp, score.fp, score.fn)
+    assert {row: counts for row, counts in found.items() if row[0] in models} == known
 
 
 ORDERS, EPISODES = 200, 20
