@@ -179,12 +179,12 @@ def _groups(values: Iterable[Hashable]) -> dict[Hashable, tuple[int, ...]]:
 class Match:
     """The effect of each step of a plan.
 
-    `vertices[i]` is the goal vertex that step i placed, or None; `placed[i]` the bit mask of the
-    vertices placed before step i; `n_blocks` the size of the goal.
+    For each step, `vertices` has the goal vertex that it placed, or None, and `errors` its error
+    type, or None for a true positive; `n_blocks` is the size of the goal.
     """
 
     vertices: tuple[int | None, ...]
-    placed: tuple[int, ...]
+    errors: tuple[ErrorType | None, ...]
     n_blocks: int
 
     @property
@@ -206,14 +206,15 @@ def match_plan(goal: Goal, plan: Plan, matcher: Matcher) -> Match:
     vertices: list[int | None] = []
     if matcher == "optimal":
         vertices = _best_choices(goal, plan)
-    placed, masks = 0, []
+    errors: list[ErrorType | None] = []
+    placed = 0
     for step, index in enumerate(plan.steps):
-        masks.append(placed)
         if matcher == "paper":
             vertices.append(next(iter(goal.choices(index, placed)), None))
         vertex = vertices[step]
+        errors.append(goal.error(index, placed) if vertex is None else None)
         placed |= 0 if vertex is None else 1 << vertex
-    return Match(tuple(vertices), tuple(masks), len(goal.graph))
+    return Match(tuple(vertices), tuple(errors), len(goal.graph))
 
 
 def _best_choices(goal: Goal, plan: Plan) -> list[int | None]:
@@ -281,14 +282,6 @@ def most_placed(goal: Goal, plan: Plan) -> int:
                 reached.update([placed | itself for _, itself in ready] or [placed])
             frontier = reached
     return max(mask.bit_count() for mask in frontier)
-
-
-def step_errors(goal: Goal, plan: Plan, match: Match) -> tuple[ErrorType | None, ...]:
-    """For each step its error type, or None for a true positive."""
-    return tuple(
-        goal.error(index, placed) if vertex is None else None
-        for index, vertex, placed in zip(plan.steps, match.vertices, match.placed, strict=True)
-    )
 
 
 def count_errors(errors: Iterable[ErrorType | None]) -> dict[ErrorType, int]:
@@ -513,11 +506,10 @@ class AssemblyScorer:
             kept = steps_kept(goal, plan, max(placed))
             outcomes = block_outcomes(goal, plan, placed)
             for matcher, match, blocks in zip(matchers, matches, outcomes, strict=True):
-                why = step_errors(goal, plan, match)
                 scores.append(
                     Score(**vars(match.counts), criterion="aov", setting=setting, matcher=matcher,
-                          errors=count_errors(why), placed=match.vertices, why=why, blocks=blocks,
-                          kept=kept)
+                          errors=count_errors(match.errors), placed=match.vertices,
+                          why=match.errors, blocks=blocks, kept=kept)
                 )  # fmt: skip
             if level1 is not None and 1 in self._scene.levels:
                 counts = vars(level1_counts(goal, plan, level1))

@@ -99,13 +99,6 @@ class Physics:
         return significant(SHAPES[block_type].mass_kg * factor)
 
 
-class Velocity(NamedTuple):
-    """Velocity of a block's center of mass [m/s], and its angular velocity [rad/s]."""
-
-    linear_m_s: Vector
-    angular_rad_s: Vector
-
-
 class World(ABC):
     """Rigid blocks on a floor, by their order; a context manager.
 
@@ -130,8 +123,7 @@ class World(ABC):
         """Put blocks at their goal poses, at rest, rounded to digits that machines agree on."""
         for block in blocks:
             goal = Pose.goal(block)
-            pose = Pose(rounded(goal.position_m), rounded(goal.quat_xyzw))
-            self._add(block.order, block.type, pose)
+            self._add(block, Pose(rounded(goal.position_m), rounded(goal.quat_xyzw)))
             self._blocks[block.order] = block
 
     def remove(self, order: int) -> None:
@@ -147,10 +139,9 @@ class World(ABC):
         """Upper bound of the speed of the fastest corner [m/s]; 0 in an empty world."""
         fastest = 0.0
         for order, block in self._blocks.items():
-            shape, velocity = SHAPES[block.type], self.velocity(order)
+            shape, (linear_m_s, angular_rad_s) = SHAPES[block.type], self.velocity(order)
             reach_m = math.dist(shape.low_m, shape.high_m)
-            spin = math.hypot(*velocity.angular_rad_s) * reach_m
-            fastest = max(fastest, math.hypot(*velocity.linear_m_s) + spin)
+            fastest = max(fastest, math.hypot(*linear_m_s) + math.hypot(*angular_rad_s) * reach_m)
         return fastest
 
     def poses(self) -> dict[int, Pose]:
@@ -162,11 +153,11 @@ class World(ABC):
         """Return the current pose of a block."""
 
     @abstractmethod
-    def velocity(self, order: int) -> Velocity:
-        """Return the current velocity of a block."""
+    def velocity(self, order: int) -> tuple[Vector, Vector]:
+        """Return the velocity of a block's center of mass [m/s], and its angular one [rad/s]."""
 
     @abstractmethod
-    def _add(self, order: int, block_type: BlockType, pose: Pose) -> None:
+    def _add(self, block: Block, pose: Pose) -> None:
         """Add a block at a pose, at rest."""
 
     @abstractmethod

@@ -8,7 +8,6 @@ friction cone; collision pieces shrunk slightly, so that blocks side by side do 
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass
 from types import ModuleType
 from typing import Any, cast
 
@@ -16,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phyblock.domain.blocks import SHAPES, BlockType, quat_xyzw_to_matrix
+from phyblock.domain.scene import Block
 from phyblock.errors import SimulationError
-from phyblock.sim.engine import Physics, Pose, Velocity, World
+from phyblock.sim.engine import Physics, Pose, Vector, World
 from phyblock.sim.geometry import collision_pieces, principal_inertia_m2, rounded
 
 _SUBSTEPS = 4
@@ -43,25 +43,6 @@ def _loaded() -> ModuleType:
     return cast(ModuleType, mujoco)
 
 
-@dataclass
-class _Body:
-    """A block; `place` (7,): position [m], quaternion w x y z; `motion` (6,): m/s, body rad/s."""
-
-    type: BlockType
-    place: Floats
-    motion: Floats
-
-    @property
-    def rotation(self) -> Floats:
-        """Body to world, shape (3, 3)."""
-        return quat_xyzw_to_matrix(np.roll(self.place[3:], -1))
-
-    @property
-    def center_m(self) -> Floats:
-        """Vector from its frame's origin to its center of mass, in the world, shape (3,) [m]."""
-        return self.rotation @ np.array(SHAPES[self.type].center_of_mass_m)
-
-
 class MujocoWorld(World):
     """Blocks on a plane; adding or removing a block starts a new model."""
 
@@ -69,60 +50,57 @@ class MujocoWorld(World):
 
     def __init__(self, physics: Physics) -> None:
         super().__init__(physics)
-        self._mujoco = _loaded()
-        self._bodies: dict[int, _Body] = {}
+        self._states: dict[int, tuple[Floats, Floats]] = {}
+        """Place (7,), [m] and quaternion w x y z, and motion (6,), m/s and body rad/s."""
         self._model: Any = None
         self._data: Any = None
 
-    def _add(self, order: int, block_type: BlockType, pose: Pose) -> None:
+    def _add(self, block: Block, pose: Pose) -> None:
         self._interrupt()
         place = np.concatenate([pose.position_m, np.roll(pose.quat_xyzw, 1)])
-        self._bodies[order] = _Body(block_type, place, np.zeros(6))
+        self._states[block.order] = place, np.zeros(6)
 
     def _remove(self, order: int) -> None:
         self._interrupt()
-        del self._bodies[order]
+        del self._states[order]
+
+    def _interrupt(self) -> None:
+        """Drop the data before blocks are added or removed."""
+        for order, (place, motion) in self._states.items():
+            self._states[order] = place.copy(), motion.copy()
+        self._model = self._data = None
 
     def _step(self, n: int) -> None:
         if n < 1:
             return
-        self._begin()
-        self._mujoco.mj_step(self._model, self._data, _SUBSTEPS * n)
+        mujoco = _loaded()
+        if self._data is None:
+            self._model = _model(tuple(b.type for b in self._blocks.values()), self.physics)
+            self._data = mujoco.MjData(self._model)
+            places, motions = self._data.qpos.reshape(-1, 7), self._data.qvel.reshape(-1, 6)
+            for order, *state in zip(self._blocks, places, motions, strict=True):
+                for now, before in zip(state, self._states[order], strict=True):
+                    now[:] = before
+                self._states[order] = (state[0], state[1])
+        mujoco.mj_step(self._model, self._data, _SUBSTEPS * n)
         if any(warning.number for warning in self._data.warning):
             raise SimulationError("MuJoCo found no way on: forces or contacts beyond all bounds")
 
     def pose(self, order: int) -> Pose:
         """Return the current pose of a block."""
-        place = self._bodies[order].place
+        place, _ = self._states[order]
         return Pose(place[:3].copy(), np.roll(place[3:], -1))
 
-    def velocity(self, order: int) -> Velocity:
-        """Return the current velocity of a block."""
-        body = self._bodies[order]
-        spin = body.rotation @ body.motion[3:]
-        linear = body.motion[:3] + np.cross(spin, body.center_m)
-        return Velocity(_vector(linear), _vector(spin))
-
-    def _interrupt(self) -> None:
-        """Drop the data before blocks are added or removed."""
-        for body in self._bodies.values():
-            body.place, body.motion = body.place.copy(), body.motion.copy()
-        self._model = self._data = None
-
-    def _begin(self) -> None:
-        """Create data with the current blocks, unless they exist."""
-        if self._data is not None:
-            return
-        types = tuple(body.type for body in self._bodies.values())
-        self._model = _model(types, self.physics)
-        self._data = self._mujoco.MjData(self._model)
-        places, motions = self._data.qpos.reshape(-1, 7), self._data.qvel.reshape(-1, 6)
-        for place, motion, body in zip(places, motions, self._bodies.values(), strict=True):
-            place[:], motion[:] = body.place, body.motion
-            body.place, body.motion = place, motion
+    def velocity(self, order: int) -> tuple[Vector, Vector]:
+        """Return the velocity of a block's center of mass [m/s], and its angular one [rad/s]."""
+        place, motion = self._states[order]
+        rotation = quat_xyzw_to_matrix(np.roll(place[3:], -1))
+        center_m = rotation @ np.array(SHAPES[self._blocks[order].type].center_of_mass_m)
+        spin = rotation @ motion[3:]
+        return _vector(motion[:3] + np.cross(spin, center_m)), _vector(spin)
 
 
-def _vector(values: Floats) -> tuple[float, float, float]:
+def _vector(values: Floats) -> Vector:
     x, y, z = values.tolist()
     return x, y, z
 

@@ -19,8 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phyblock.domain.blocks import SHAPES, BlockType, quat_xyzw_to_matrix
+from phyblock.domain.scene import Block
 from phyblock.errors import SimulationError
-from phyblock.sim.engine import Physics, Pose, Velocity, World
+from phyblock.sim.engine import Physics, Pose, Vector, World
 from phyblock.sim.geometry import collision_pieces, principal_inertia_m2, rounded, turned
 
 _MESH_MARGIN_M = 0.001
@@ -69,7 +70,8 @@ class BulletWorld(World):
         """Call a function of PyBullet for this client."""
         return getattr(self._bullet, name)(*args, physicsClientId=self._client, **more)
 
-    def _add(self, order: int, block_type: BlockType, pose: Pose) -> None:
+    def _add(self, block: Block, pose: Pose) -> None:
+        block_type = block.type
         if block_type not in self._shapes:
             self._shapes[block_type] = self._shape(block_type)
         mass_kg = self.physics.mass_kg(block_type)
@@ -81,7 +83,7 @@ class BulletWorld(World):
         offset_here_m = turned(offset_m, quat_xyzw_to_matrix(pose.quat_xyzw))
         place = rounded(pose.position_m + offset_here_m).tolist(), pose.quat_xyzw.tolist()
         self._call("resetBasePositionAndOrientation", body, *place)
-        self._bodies[order] = (body, offset_m)
+        self._bodies[block.order] = (body, offset_m)
 
     def _remove(self, order: int) -> None:
         self._call("removeBody", self._bodies.pop(order)[0])
@@ -100,9 +102,10 @@ class BulletWorld(World):
         center_m, quat_xyzw = map(np.array, self._call("getBasePositionAndOrientation", body))
         return Pose(center_m - quat_xyzw_to_matrix(quat_xyzw) @ offset_m, quat_xyzw)
 
-    def velocity(self, order: int) -> Velocity:
-        """Return the current velocity of a block."""
-        return Velocity(*self._call("getBaseVelocity", self._bodies[order][0]))
+    def velocity(self, order: int) -> tuple[Vector, Vector]:
+        """Return the velocity of a block's center of mass [m/s], and its angular one [rad/s]."""
+        linear, angular = self._call("getBaseVelocity", self._bodies[order][0])
+        return linear, angular
 
     def _set_friction(self, body: int) -> None:
         self._call(

@@ -85,7 +85,7 @@ def test_a_block_in_the_air_falls_the_way_of_gravity(engine):
         opened.place(one)
         opened.step(duration_s)
         way = opened.pose(1).position_m - np.array(one.position_m)
-        speed = opened.velocity(1).linear_m_s
+        speed = opened.velocity(1)[0]
     assert_allclose(
         way, GRAVITY_M_S2 * np.array(downhill) * duration_s**2 / 2, rtol=0.03, atol=1e-9
     )
