@@ -24,7 +24,7 @@ from phyblock.results.estimates import (
     track_notes,
 )
 from phyblock.results.load import Design, Run, checked_models, track_measures
-from phyblock.results.text import NO_VALUE, Column, TextTable, level_name, number, to_csv
+from phyblock.results.text import NO_VALUE, Column, Row, TextTable, level_name, number, to_csv
 from phyblock.scoring import statistics
 from phyblock.scoring.plan import Floats
 from phyblock.text import counted
@@ -446,9 +446,11 @@ def compare_view(found: Comparison) -> TextTable:
     group = in_unit(found.name, found.unit)
     columns = [Column.text("a", "A", once=True), Column.text("b", "B", once=True)]
     if found.table["part"].nunique() > 1:
-        part = lambda row: level_name(row["part"].replace("_", " "))  # noqa: E731
-        columns.append(Column("Part", "", True, part))
-    p_text = lambda row: "< 0.001" if row["p_holm"] < 0.001 else number(row["p_holm"], 3)  # noqa: E731
+        columns.append(Column("Part", "", True, lambda row: level_name(row["part"])))
+
+    def p_text(row: Row) -> str:
+        return "< 0.001" if row["p_holm"] < 0.001 else number(row["p_holm"], 3)
+
     columns += [
         *(Column.value("value_a", "A", group), Column.value("value_b", "B", group)),
         Column.value("difference", "A - B", group, signed=True),

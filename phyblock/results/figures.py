@@ -135,7 +135,7 @@ def forest(run: Run, *, track: str) -> Figure | None:
         return None
     if len(models) == 2:
         table = pd.concat([table.iloc[-1:], table.iloc[:-1]])
-        labels = [level_name(part.replace("_", " ")) for part in table["part"]]
+        labels = [level_name(part) for part in table["part"]]
         title = f"{table.iloc[0]['a']} minus {table.iloc[0]['b']}"
     elif len(models) > _MOST_MODELS:
         # Pairs are in the order of the given models.

@@ -165,12 +165,6 @@ _COST = [
     *("latency_median_s", "latency_p90_s", "cached", "attempts"),
 ]
 
-_SUMS = [
-    *("recorded", *OUTCOMES, "replies", "tokens_unknown", "cost_unknown", "cached", "attempts")
-]
-_MADE = "coverage and cost"
-"""Key of the frame of both in `Run.made`."""
-
 
 def coverage_frame(run: Run) -> pd.DataFrame:
     """Return one row per model and track: its samples, tokens, cost and latency.
@@ -184,41 +178,37 @@ def coverage_frame(run: Run) -> pd.DataFrame:
     `attempts`, the number of requests sent for them. NaN if nothing is known. The frame is cached
     and must not be changed.
     """
-    if _MADE in run.made:
-        return run.made[_MADE]
+    if "coverage" in run.made:
+        return run.made["coverage"]
     records, design = run.records, run.design
     replied, cached = records["finish"].notna(), records["cached"].fillna(False).astype(bool)
     attempts = records["attempts"].fillna(0).astype("int64")
     paid, sent = replied & ~cached, attempts > 0
-    facts = records[[*_ROW, *TOKENS]].astype(dict.fromkeys(TOKENS, "Float64"))
-    facts = facts.assign(
-        recorded=1,
+    marks: dict[str, pd.Series] = {
+        "recorded": records["outcome"].notna(),
         **{name: records["outcome"] == name for name in OUTCOMES},
-        replies=replied,
-        tokens_unknown=replied & records["completion_tokens"].isna(),
-        cost_unknown=paid & records["paid_usd"].isna(),
-        cached=cached,
-        attempts=attempts,
-        cost_usd=records["paid_usd"].where(paid),
-        price=records["cost_usd"].where(sent | cached),
-        latency_s=records["latency_s"].where(sent),
-    )
-    groups = facts.groupby(_ROW)
+        "replies": replied,
+        "tokens_unknown": replied & records["completion_tokens"].isna(),
+        "cost_unknown": paid & records["paid_usd"].isna(),
+        "cached": cached,
+        "attempts": attempts,
+    }
+    counts = pd.DataFrame(marks).astype("float64")
+    by = [records["model"], records["track"]]
+    costs = records[list(TOKENS)].astype("Float64").groupby(by).mean().astype("float64")
+    costs["cost_usd"] = records["paid_usd"].where(paid).groupby(by).sum(min_count=1)
+    costs["cost_per_100_usd"] = 100 * records["cost_usd"].where(sent | cached).groupby(by).mean()
+    latencies = records["latency_s"].where(sent).groupby(by)
+    costs["latency_median_s"], costs["latency_p90_s"] = latencies.median(), latencies.quantile(0.9)
     planned = [(m, t, design.samples(t)) for m in design.model_names for t in design.suite.tracks]
     table = pd.DataFrame(planned, columns=[*_ROW, "expected"])
-    table = table.join(groups[_SUMS].sum(), on=_ROW)
-    # Columns of an empty frame may have any type, which pandas fills with a warning.
-    table[_SUMS] = table[_SUMS].astype("float64").fillna(0).astype("int64")
-    costs = groups[list(TOKENS)].mean().astype("float64")
-    costs["cost_usd"] = groups["cost_usd"].sum(min_count=1)
-    costs["cost_per_100_usd"] = 100 * groups["price"].mean()
-    costs["latency_median_s"] = groups["latency_s"].median()
-    costs["latency_p90_s"] = groups["latency_s"].quantile(0.9)
-    table = table.join(costs, on=_ROW)
+    table = table.join(counts.groupby(by).sum(), on=_ROW).join(costs, on=_ROW)
+    table = table.astype(dict.fromkeys(counts, "float64")).fillna(dict.fromkeys(counts, 0.0))
+    table = table.astype(dict.fromkeys(counts, "int64"))
     table.loc[(table["replies"] > 0) & (table["replies"] == table["cached"]), "cost_usd"] = 0.0
     table["not_run"] = table["expected"] - table["recorded"]
-    run.made[_MADE] = table[[*_COVERAGE, *_COST[2:]]]
-    return run.made[_MADE]
+    run.made["coverage"] = table[[*_COVERAGE, *_COST[2:]]]
+    return run.made["coverage"]
 
 
 def coverage_table(run: Run) -> TextTable:

@@ -142,7 +142,7 @@ def captioned(caption: str, words: Sequence[str]) -> str:
 
 def level_name(level: str) -> str:
     """Return `Level 3` or `Overall`."""
-    return f"Level {level}" if level.isdigit() else level.capitalize()
+    return f"Level {level}" if level.isdigit() else level.replace("_", " ").capitalize()
 
 
 def to_csv(frame: pd.DataFrame, float_format: str | None = None) -> str:
