@@ -186,10 +186,8 @@ def _conflicts(
         is_elsewhere = set(earlier.addresses) != set(later.addresses)
         if is_elsewhere and earlier.identity() == later.identity():
             message = f"is {earlier.name} at another address: they would share their replies"
-            found, hint = (
-                ", ".join(sorted(later.addresses)),
-                "give one a revision, or run one alone",
-            )
+            found = ", ".join(sorted(later.addresses))
+            hint = "give one of them a revision, or run one alone"
             yield Problem(f"model {later.name}", message, "api_base", found, hint=hint)
     for model in models:
         where, is_replay = f"model {model.name}", model.kind == "replay"
