@@ -57,16 +57,14 @@ def boxes_near(first: Floats, second: Floats, reach_m: float) -> bool:
 @functools.lru_cache(maxsize=_KEPT)
 def pieces_of(block: Block) -> tuple[ConvexPiece, ...]:
     """The convex pieces of a block at its pose, world frame."""
-    rotation, position_m = euler_deg_to_matrix(block.euler_deg), np.array(block.position_m)
-    return tuple(moved(piece, rotation, position_m) for piece in collision_pieces(block.type))
-
-
-def moved(piece: ConvexPiece, rotation: Floats, position_m: Floats) -> ConvexPiece:
-    """The piece turned by `rotation` (3, 3) and then shifted to `position_m` (3,) [m]."""
-    return ConvexPiece(
-        piece.vertices_m @ rotation.T + position_m,
-        piece.face_normals @ rotation.T,
-        piece.edge_directions @ rotation.T,
+    turn = euler_deg_to_matrix(block.euler_deg).T
+    return tuple(
+        ConvexPiece(
+            piece.vertices_m @ turn + np.array(block.position_m),
+            piece.face_normals @ turn,
+            piece.edge_directions @ turn,
+        )
+        for piece in collision_pieces(block.type)
     )
 
 
@@ -389,7 +387,7 @@ def voxel_iou(one: Sequence[Block], other: Sequence[Block]) -> float:
 
 def filled_voxels(blocks: Sequence[Block]) -> Voxels:
     """The voxels that blocks reach into, in ascending order, and the points of each inside."""
-    found = [_filled(block.type, block.position_m, block.euler_deg) for block in blocks]
+    found = [_filled((one.type, one.euler_deg), one.position_m) for one in blocks]
     if not found:
         return np.zeros(0, dtype=np.int64), np.zeros((0, _POINTS // 8), dtype=np.uint8)
     names, bits = (np.concatenate(part) for part in zip(*found, strict=True))
@@ -400,10 +398,8 @@ def filled_voxels(blocks: Sequence[Block]) -> Voxels:
 
 
 @functools.lru_cache(maxsize=256)
-def _filled(
-    block_type: BlockType, position_m: tuple[float, float, float], euler_deg: Euler
-) -> Voxels:
-    block = Block(1, block_type, "red", position_m, euler_deg, (), 1)
+def _filled(turned: Turned, place_m: tuple[float, float, float]) -> Voxels:
+    block = at(turned, place_m)
     low, high = (bounds_m(block) / VOXEL_M).round(9)
     first = np.floor(low).astype(np.int64) - 1
     count = np.ceil(high).astype(np.int64) + 1 - first

@@ -14,15 +14,13 @@ from phyblock.domain.blocks import (
     BLOCK_TYPES,
     KIT_PALETTE,
     SHAPES,
-    euler_deg_to_quat_xyzw,
-    quat_xyzw_to_matrix,
 )
 from phyblock.sim.contact import (
     GROUND,
     drop_m,
     find_gaps,
     find_overlaps,
-    moved,
+    pieces_of,
     separating_axes,
     support_graph,
 )
@@ -117,11 +115,6 @@ ANNOTATION_ERROR_M = 0.002
 shifts_m = st.floats(-0.12, 0.12)
 
 
-def placed(one):
-    rotation = quat_xyzw_to_matrix(euler_deg_to_quat_xyzw(one.euler_deg))
-    return [moved(p, rotation, np.array(one.position_m)) for p in collision_pieces(one.type)]
-
-
 def share_a_point(first, second):
     """True if two convex hulls meet, asked of a linear program."""
     n, m = len(first.vertices_m), len(second.vertices_m)
@@ -135,8 +128,8 @@ def share_a_point(first, second):
 @given(block_types, eulers, block_types, eulers, shifts_m, shifts_m, shifts_m)
 @settings(max_examples=60)
 def test_separation_agrees_with_a_linear_program(one, turn, other, twist, x, y, z):
-    first = placed(block(1, one, (0.0, 0.0, 0.0), turn))[0]
-    second = placed(block(2, other, (x, y, z), twist))[0]
+    first = pieces_of(block(1, one, (0.0, 0.0, 0.0), turn))[0]
+    second = pieces_of(block(2, other, (x, y, z), twist))[0]
     gap_m = separating_axes(first, second).gap_m
     assume(abs(gap_m) > 1e-5)
     assert share_a_point(first, second) == (gap_m < 0)
@@ -146,8 +139,8 @@ def test_separation_agrees_with_a_linear_program(one, turn, other, twist, x, y, 
 @given(block_types, eulers, block_types, eulers, shifts_m, shifts_m)
 @settings(max_examples=60)
 def test_a_block_falls_just_until_it_touches(one, turn, other, twist, x, y):
-    first = placed(block(1, one, (0.0, 0.0, 0.0), turn))[0]
-    second = placed(block(2, other, (x, y, 0.4), twist))[0]
+    first = pieces_of(block(1, one, (0.0, 0.0, 0.0), turn))[0]
+    second = pieces_of(block(2, other, (x, y, 0.4), twist))[0]
     fall_m = drop_m(separating_axes(first, second))
     low = replace(second, vertices_m=second.vertices_m - [0.0, 0.0, fall_m or 0.4])
     gap_m = separating_axes(first, low).gap_m
