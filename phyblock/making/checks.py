@@ -39,25 +39,6 @@ class Finding(Problem):
     blocks: tuple[int, ...] = ()
 
 
-@dataclass(frozen=True)
-class Tolerances:
-    """Limits: overlaps and gaps up to `fit_m` [m], movement within the limits of a trial.
-
-    The finished structure is simulated to the end of the `trial`, or until it is at rest for
-    `quiet_s` [s]. Each earlier step is tried at the first of the trial's time steps.
-    """
-
-    fit_m: float = FIT_TOLERANCE_M
-    trial: Trial = DEFAULT_TRIAL
-    quiet_s: float | None = None
-
-
-OURS = Tolerances()
-"""For scenes made here."""
-FOREIGN = Tolerances(fit_m=0.002, quiet_s=0.5)  # 2 mm cannot be seen in a picture.
-"""For scenes made elsewhere, with positions written by hand in rounded millimeters."""
-
-
 class Limits(NamedTuple):
     """The blocks and layers that a level allows (paper section 3.1)."""
 
@@ -77,12 +58,19 @@ LEVEL_LIMITS: dict[int, Limits] = {
 
 @dataclass(frozen=True)
 class SceneFacts:
-    """A scene with cached facts for its checks; without `candidates` their checks find nothing."""
+    """A scene with cached facts for its checks; without `candidates` their checks find nothing.
+
+    Overlaps and gaps may be up to `fit_m` [m]. The finished structure is simulated to the end of
+    the `trial`, or until it is at rest for `quiet_s` [s], each earlier step at the first of the
+    trial's time steps.
+    """
 
     scene: Scene
     candidates: CandidateSet | None = None
-    tolerances: Tolerances = OURS
     palette: tuple[Kind, ...] = KIT_PALETTE
+    fit_m: float = FIT_TOLERANCE_M
+    trial: Trial = DEFAULT_TRIAL
+    quiet_s: float | None = None
 
     @cached_property
     def contacts(self) -> Mapping[int, frozenset[int]]:
@@ -157,14 +145,14 @@ def _hidden(facts: SceneFacts) -> Iterator[Finding]:
 
 def _overlap(facts: SceneFacts) -> Iterator[Finding]:
     """Blocks that share space, with one another or with the ground."""
-    for one in find_overlaps(facts.scene.blocks, facts.tolerances.fit_m):
+    for one in find_overlaps(facts.scene.blocks, facts.fit_m):
         message = f"block {one.second} overlaps {_name(one.first)} by {one.depth_m * 1000:.2f} mm"
         yield _fault(message, one.first, one.second)
 
 
 def _floating(facts: SceneFacts) -> Iterator[Finding]:
     """Blocks that hang above what is below them."""
-    for gap in find_gaps(facts.scene.blocks, facts.tolerances.fit_m):
+    for gap in find_gaps(facts.scene.blocks, facts.fit_m):
         message = f"block {gap.order} floats {gap.height_m * 1000:.2f} mm above its support"
         yield _fault(message, gap.order)
 
@@ -185,21 +173,19 @@ def _dependencies(facts: SceneFacts, is_declared: bool) -> Iterator[Finding]:
 
 def _unstable_step(facts: SceneFacts) -> Iterator[Finding]:
     """Steps of the stored order, before the last one, after which something falls."""
-    trial, blocks = facts.tolerances.trial, facts.scene.blocks
-    first = replace(trial, physics=trial.physics[:1])
+    blocks, first = facts.scene.blocks, replace(facts.trial, physics=facts.trial.physics[:1])
     for count, step in enumerate(check_steps(blocks[:-1], first), 1):
         if not step.stable:
             when = f"at step {count}, once block {blocks[count - 1].order} is placed"
-            yield _fall(step, when, trial)
+            yield _fall(step, when, first)
 
 
 def _unstable(facts: SceneFacts) -> Iterator[Finding]:
     """Blocks that fall from the finished structure."""
-    trial = facts.tolerances.trial
-    whole = check(facts.scene.blocks, trial, facts.tolerances.quiet_s)
+    whole = check(facts.scene.blocks, facts.trial, facts.quiet_s)
     if not whole.stable:
         differing = "" if whole.agreed else ", not the same ones at every time step"
-        yield _fall(whole, f"when all is built{differing}", trial)
+        yield _fall(whole, f"when all is built{differing}", facts.trial)
 
 
 def _fall(shown: Stability, when: str, trial: Trial) -> Finding:
@@ -293,9 +279,13 @@ def verify_scene(task: Task) -> tuple[Finding, ...]:
     return tuple(findings_of(SceneFacts(*task), VERIFIED))
 
 
-def verify_foreign(task: Task, tolerances: Tolerances = FOREIGN) -> tuple[Finding, ...]:
-    """Return the findings about a scene of the official data and its candidate set."""
-    return tuple(findings_of(SceneFacts(*task, tolerances), FOREIGN_CHECKS))
+def verify_foreign(task: Task, trial: Trial = DEFAULT_TRIAL) -> tuple[Finding, ...]:
+    """Return the findings about a scene of the official data and its candidate set, whose positions
+    were written by hand in rounded millimeters.
+    """
+    # 2 mm cannot be seen in a picture.
+    facts = SceneFacts(*task, fit_m=0.002, trial=trial, quiet_s=0.5)
+    return tuple(findings_of(facts, FOREIGN_CHECKS))
 
 
 def check_set(scenes: Sequence[Scene]) -> tuple[Finding, ...]:

@@ -9,9 +9,7 @@ from phyblock.domain.scene import CandidateSet
 from phyblock.domain.symmetry import Symmetry
 from phyblock.making.checks import (
     CHECKS,
-    FOREIGN,
     FOREIGN_CHECKS,
-    OURS,
     VERIFIED,
     SceneFacts,
     check_set,
@@ -32,8 +30,6 @@ from tests.sim.test_geometry import FLOATING, OVERLAPPING
 
 BUILT_IN = DATA / "phyblock-400"
 SHORT = Trial(duration_s=1.0, physics=(Physics(),))
-QUICK = replace(OURS, trial=SHORT)
-QUICK_FOREIGN = replace(FOREIGN, trial=SHORT)
 GATE = make_scene("l1-gate", (1,), built("arch; cuboid2:flat-y; triangle").blocks)
 OFFERED = make_candidates(GATE)
 
@@ -61,7 +57,7 @@ def beam():
 
 def offering(change):
     assert callable(change)
-    return SceneFacts(GATE, CandidateSet(change(OFFERED.candidates)), QUICK)
+    return SceneFacts(GATE, CandidateSet(change(OFFERED.candidates)), trial=SHORT)
 
 
 STRANGE = replace(OFFERED.candidates[0], type="arch", color="red", euler_deg=(45.0, 0.0, 0.0))
@@ -78,11 +74,11 @@ SPOILED = {
     "overlap": (lambda: SceneFacts(lifted(-0.004)), "block 3 overlaps block 2 by 4.00 mm"),
     "floating": (lambda: SceneFacts(lifted(0.004)), "block 3 floats 4.00 mm"),
     "unstable": (
-        lambda: SceneFacts(lifted(0.05), tolerances=QUICK),
+        lambda: SceneFacts(lifted(0.05), trial=SHORT),
         "block 3 falls when all is built",
     ),
     "unstable step": (
-        lambda: SceneFacts(beam(), tolerances=QUICK),
+        lambda: SceneFacts(beam(), trial=SHORT),
         "blocks 2, 3 fall at step 3, once block 3 is placed",
     ),
     "hidden": (lambda: SceneFacts(cellar()), "does not show in the goal picture"),
@@ -98,7 +94,7 @@ def test_every_check_has_an_example_here_and_is_chosen_somewhere():
 
 @pytest.mark.parametrize("name", SPOILED)
 def test_a_check_finds_its_own_fault_measured_in_units(name):
-    assert list(findings_of(SceneFacts(GATE, OFFERED, QUICK), [name])) == []
+    assert list(findings_of(SceneFacts(GATE, OFFERED, trial=SHORT), [name])) == []
     make, said = SPOILED[name]
     facts = make()
     findings = list(findings_of(facts, [name]))
@@ -158,9 +154,7 @@ def checks_of(findings):
 def test_official_annotation_errors_are_reported(official_checkout):
     tasks = {task.scene.id: task for task in official_tasks(official_checkout)}
     for name in ("000", "001", "040", "069", "187"):
-        found = checks_of(
-            verify_foreign((tasks[name].scene, tasks[name].candidates), QUICK_FOREIGN)
-        )
+        found = checks_of(verify_foreign((tasks[name].scene, tasks[name].candidates), SHORT))
         assert ("overlap" in found) == (name in OVERLAPPING)
         assert ("floating" in found) == ("unstable" in found) == (name in FLOATING)
         assert ("dependency without contact" in found) == (name in {"040", "069"})

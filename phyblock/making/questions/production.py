@@ -65,7 +65,13 @@ def make_questions(
     questions: list[Question] = []
     short = []
     for subtask, count in wanted.items():
-        tasks = [(subtask, seed, scene) for scene in _by_levels(scenes, _rng(seed, subtask))]
+        # In an order drawn, one of each level in turn.
+        turns: Counter[int] = Counter()
+        ranked = []
+        for scene in shuffled(_rng(seed, subtask), scenes):
+            turns[scene.level] += 1
+            ranked.append((turns[scene.level], scene.level, (subtask, seed, scene)))
+        tasks = [task for *_, task in sorted(ranked, key=lambda one: one[:2])]
         pool: list[Draft] = []
         for drafts in track(workers.map(scene_drafts, tasks), len(tasks), f"Drafting {subtask}"):
             pool += drafts
@@ -109,15 +115,6 @@ def scene_drafts(task: tuple[Subtask, int, Scene]) -> list[Draft]:
 
 def _rng(seed: int, *parts: str) -> np.random.Generator:
     return np.random.default_rng(list("/".join((str(seed), *parts)).encode()))
-
-
-def _by_levels(scenes: Sequence[Scene], rng: np.random.Generator) -> list[Scene]:
-    """Return the scenes in an order drawn, one of each level in turn."""
-    by_level: dict[int, list[Scene]] = {}
-    for scene in shuffled(rng, scenes):
-        by_level.setdefault(scene.level, []).append(scene)
-    turns = [(i, level) for level, group in by_level.items() for i in range(len(group))]
-    return [by_level[level][i] for i, level in sorted(turns)]
 
 
 def as_question(
