@@ -25,7 +25,7 @@ from phyblock.sim.contact import (
     support_graph,
 )
 from phyblock.sim.geometry import collision_pieces, drawn_mesh, solid_mesh
-from tests.shipped import official_tasks
+from tests.shipped import TASKS, official_tasks
 from tests.sim.structures import angles_deg, block, block_types, eulers, tower, turned
 
 every_type = pytest.mark.parametrize("block_type", BLOCK_TYPES)
@@ -155,6 +155,16 @@ def test_a_block_falls_just_until_it_touches(one, turn, other, twist, x, y):
 def test_support_of_a_turned_tower(angle_deg, x, y, height):
     graph = support_graph(turned(tower(height), angle_deg, (x, y)))
     assert graph == {i + 1: frozenset({i}) for i in range(height)}
+
+
+def test_supports_of_built_in_scenes_are_those_that_they_declare():
+    for task in TASKS[::16]:
+        blocks = task.scene.blocks
+        assert not find_gaps(blocks), task.scene.id
+        assert not find_overlaps(blocks), task.scene.id
+        for some in (blocks, blocks[::-1]):
+            found = {order: set(below) - {GROUND} for order, below in support_graph(some).items()}
+            assert found == {one.order: set(one.depend) for one in some}, task.scene.id
 
 
 @given(st.floats(-0.02, 0.3))
