@@ -121,6 +121,10 @@ def test_nothing_is_spent_unasked_where_nobody_can_be_asked(suite):
         running.server.faults = Faults()
         limited = suite.run("--models", "alpha", *limit, "--retry-failed")
         assert (limited.code, running.server.requests) == (0, 10), limited.err
+        more = ["--models", "alpha", "--set", "seeds=[7]"]
+        assert (suite.run(*more).code, running.server.requests) == (2, 10)
+        agreed = suite.run(*more, "--yes")
+        assert (agreed.code, running.server.requests) == (0, 15), agreed.err
 
 
 def test_the_folder_of_a_run_is_found_again_without_naming_it(suite):
