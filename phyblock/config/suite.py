@@ -232,8 +232,8 @@ class VarySpec(Section):
     layout: Levels[Literal["composite", "separate"]] = ()
     """Layouts of pictures, as images.layout."""
     repeats: Annotated[int, Field(strict=True, ge=1, le=100)] = 1
-    """How often each request is sent. Only the first may be answered from the cache; each has
-    another seed."""
+    """Number of times that each request is sent, each with another seed. Only the first may be
+    answered from the cache."""
 
     def faults(self) -> Iterator[Fault]:
         """Yield a fault if two templates would have the same name in tables."""

@@ -198,7 +198,7 @@ class StoredScene(Line, extra="ignore"):
     """The base scenes that it was made from, at least one; a base scene names itself. Statistics
     cluster by them."""
     blocks: Annotated[SceneBlocks, checked(_layer_faults)]
-    """The goal structure: 1 to 22 blocks."""
+    """The goal structure: 1 to 40 blocks."""
     candidates: CandidateList[StoredCandidate]
     """1 to 16 candidates, numbered from 1 in this order. No two may look the same, and every block
     needs one that looks like it."""

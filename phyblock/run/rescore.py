@@ -218,7 +218,7 @@ async def _again(track: Track, item: Item, record: Record, where: str, *, strict
         if await episode.request() is None:
             break
         episode.take(turn.reply, turn.prompt)
-    # What the last reply comes to shows when the next is asked for: blocks are let go.
+    # The effect of the last reply shows at the next request, when blocks are released.
     goes_on = await episode.request() is not None
     again = judged(track, item, given, episode.judgement())
     pairs = zip(map(_decided, asked), map(_decided, again.asked_turns), strict=False)
@@ -226,10 +226,10 @@ async def _again(track: Track, item: Item, record: Record, where: str, *, strict
     if same == len(asked) and not (goes_on and record.error is None):
         return again
     if strict:
-        message = "does not go as it did: another version of phyblock made it"
+        message = "takes another course: another version of phyblock made it"
         hint = "use the version of phyblock that made the run"
         raise StoreError(Problem(where, message, "turns", record.sample, hint=hint))
-    message = f"this version asks something else from turn {same + 2} on"
+    message = f"this version sends other requests from turn {same + 2} on"
     error = StoredError(kind="retryable", message=message)
     return record.model_copy(update={"error": error, "outcome": "api_error"})
 
