@@ -58,6 +58,22 @@ def test_the_limit_is_not_passed_and_a_higher_one_goes_on(workspace):
         assert server.requests == 60
 
 
+@pytest.mark.parametrize(("prompt", "completion"), [(40_000, 40), (1000, 2500)])
+def test_a_server_that_counts_more_than_is_expected_does_not_pass_the_limit_at_once(
+    workspace, prompt, completion
+):
+    usd = (prompt * PRICE["input"] + completion * PRICE["output"]) / 1e6
+    usage = {"prompt_tokens": prompt, "completion_tokens": completion}
+    with workspace.served(
+        OpenAIChat(usage=usage), entry={"price": PRICE, "max_tokens": 100}, seeds=list(range(12))
+    ) as server:
+        done = workspace.run("--set", f"limits.max_cost_usd={5 * usd}")
+    assert done.code == 1
+    assert f"the next call can cost ${usd:.1f}"[:-2] in done.out
+    assert 1 < server.requests <= 5
+    assert spent(workspace) <= 5 * usd
+
+
 def test_a_dry_run_says_what_it_would_cost_and_asks_nothing(workspace):
     with Running(OpenAIChat()) as running:
         workspace.write_models(running.url, "alpha", price=PRICE, max_tokens=9000)

@@ -223,6 +223,14 @@ def test_ctrl_c_ends_a_run_whose_cache_is_locked(workspace):
     assert "(interrupted)" in out
 
 
+@pytest.mark.slow
+def test_a_run_with_a_locked_cache_ends_as_without_one(workspace):
+    with prepare(workspace, OpenAIChat(), AT_ONCE) as server, locked(workspace):
+        done = workspace.completed()
+        assert done.out.count("database is locked") == 1
+        assert server.requests == SAMPLES
+
+
 def catches(pid, number):
     """True if a process has its own handler of a signal, as one that asks models has of SIGTERM."""
     status = Path(f"/proc/{pid}/status").read_text(encoding="utf-8")

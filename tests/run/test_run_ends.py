@@ -22,7 +22,7 @@ from phyblock.errors import SimulationError
 from phyblock.records.files import STOPPED
 from phyblock.run.plan import make_plan
 from phyblock.run.rescore import rescore
-from phyblock.run.runner import SampleDone, Session, Stopping
+from phyblock.run.runner import SampleDone, Session, Stopping, to_its_end
 from phyblock.run.store import AppendFile
 from phyblock.sim import dynamics
 from phyblock.tracks.full_planning import FullPlanning
@@ -65,7 +65,9 @@ def prepare(workspace, server, *names):
 
 
 @pytest.mark.parametrize("name", [signal.SIGINT, signal.SIGTERM])
-def test_calls_under_way_are_waited_for_and_nothing_more_is_asked(workspace, name):
+def test_calls_under_way_are_waited_for_and_those_that_wait_for_their_turn_are_not_sent(
+    workspace, name
+):
     with prepare(workspace, OpenAIChat(holds=True), "alpha", "beta") as server:
         code, out, err = interrupted(workspace.start(), server, name)
 
@@ -336,6 +338,26 @@ def words_of(process):
     return []
 
 
+NOWHERE = "http://127.0.0.1:9"
+
+
+@pytest.mark.parametrize("words", ["HTTP 429", "no connection to 127.0.0.1:9"])
+def test_a_wait_for_another_attempt_or_for_a_server_is_given_up(workspace, words):
+    with prepare(workspace, OpenAIChat(Faults(rate_limited=1.0, retry_after="100"))) as server:
+        if "429" not in words:
+            workspace.write_models(NOWHERE, "alpha")
+        process = workspace.start()
+        while words not in process.stdout.readline():
+            assert process.poll() is None
+        wait_for(lambda: not server.at_once)
+        process.send_signal(signal.SIGINT)
+        code, out, err = ended(process)
+    assert (code, err) == (130, "")
+    assert f"0 of {SAMPLES} samples are done (interrupted)" in out
+    assert not workspace.records()
+    assert server.requests <= AT_ONCE
+
+
 def test_work_of_a_worker_that_was_killed_is_done_again_once(tmp_path):
     async def work():
         assert await shop.work_out(partial(killed, tmp_path, 1)) == "done"
@@ -347,3 +369,26 @@ def test_work_of_a_worker_that_was_killed_is_done_again_once(tmp_path):
         asyncio.run(work())
     finally:
         shop.close()
+
+
+def test_what_must_be_done_is_done_though_nobody_waits():
+    done = []
+
+    async def work():
+        await asyncio.sleep(0.05)
+        done.append("work")
+        return "record"
+
+    async def wait():
+        return await to_its_end(work())
+
+    async def cancelled():
+        waiting = asyncio.create_task(wait())
+        for _ in range(3):
+            await asyncio.sleep(0.01)
+            waiting.cancel()
+        return await waiting
+
+    assert asyncio.run(cancelled()) == ("record", True)
+    assert done == ["work"]
+    assert asyncio.run(wait()) == ("record", False)

@@ -1,5 +1,6 @@
 """Laws of runs: what must not matter does not, what is stored is enough, one process a folder."""
 
+import json
 import random
 import shutil
 import subprocess
@@ -232,6 +233,18 @@ def test_answers_to_two_versions_of_questions_are_not_mixed():
     runs = [run_of([], manifest(tracks={"vqa": {"questions": digest}})) for digest in "ab"]
     with pytest.raises(SpecError, match=r"tracks.vqa.questions: cannot be .*\n.*found: b"):
         check_pair(runs[1], runs[0], [], "vqa", Headline(runs[0], "vqa").measure)
+
+
+def test_a_record_is_one_line_of_json_whatever_the_reply_holds(workspace):
+    text = "Step1: Move block with index 1\n\u2028\x85\r\0\ud800 ￿ 😀"
+    with workspace.served(OpenAIChat(say=lambda _: text)) as server:
+        done = workspace.completed()
+        again = workspace.run()
+        assert (again.code, done.out.endswith(again.out)) == (0, True)
+        assert server.requests == 5
+    lines = (workspace.out / "records.jsonl").read_bytes().split(b"\n")[:-1]
+    assert len(lines) == 5
+    assert all("😀" in json.loads(line)["reply"]["text"] for line in lines)
 
 
 def test_scores_can_be_made_where_the_data_set_has_moved(copy):
