@@ -32,7 +32,7 @@ class Finding(Problem):
     """One problem of the scene `where`, found by a check, with a sentence that describes it.
 
     `blocks` are orders of blocks, 0 the ground. `allowed` is what geometry, physics or a limit
-    asks for.
+    requires.
     """
 
     check: str = ""
@@ -58,10 +58,10 @@ LEVEL_LIMITS: dict[int, Limits] = {
 
 @dataclass(frozen=True)
 class SceneFacts:
-    """A scene with cached facts for its checks; without `candidates` their checks find nothing.
+    """A scene with cached facts for its checks; without `candidates`, checks of them find nothing.
 
     Overlaps and gaps may be up to `fit_m` [m]. The finished structure is simulated to the end of
-    the `trial`, or until it is at rest for `quiet_s` [s], each earlier step at the first of the
+    the `trial`, or until it is at rest for `quiet_s` [s]; earlier steps only at the first of the
     trial's time steps.
     """
 
@@ -74,7 +74,7 @@ class SceneFacts:
 
     @cached_property
     def contacts(self) -> Mapping[int, frozenset[int]]:
-        """For each block, by its order, the orders that it rests on; the ground only by itself.
+        """The orders that each block rests on, by its order; the ground only if there is no other.
 
         Empty for a block that touches nothing below it.
         """
@@ -122,7 +122,7 @@ def _layer(facts: SceneFacts) -> Iterator[Finding]:
 
 
 def _order(facts: SceneFacts) -> Iterator[Finding]:
-    """Blocks that come in the file before one that they depend on."""
+    """Blocks listed in the file before one that they depend on."""
     placed: set[int] = set()
     for block in facts.scene.blocks:
         if early := sorted(set(block.depend) - placed):
@@ -133,7 +133,7 @@ def _order(facts: SceneFacts) -> Iterator[Finding]:
 
 
 def _hidden(facts: SceneFacts) -> Iterator[Finding]:
-    """Blocks too little of which is visible in the goal picture, by area or outline."""
+    """Blocks with too little area or outline visible in the goal picture."""
     hidden = hidden_blocks(facts.scene)
     for order in hidden:
         yield _fault(f"block {order} does not show in the goal picture", order)
@@ -144,14 +144,14 @@ def _hidden(facts: SceneFacts) -> Iterator[Finding]:
 
 
 def _overlap(facts: SceneFacts) -> Iterator[Finding]:
-    """Blocks that share space, with one another or with the ground."""
+    """Blocks that share space with each other or with the ground."""
     for one in find_overlaps(facts.scene.blocks, facts.fit_m):
         message = f"block {one.second} overlaps {_name(one.first)} by {one.depth_m * 1000:.2f} mm"
         yield _fault(message, one.first, one.second)
 
 
 def _floating(facts: SceneFacts) -> Iterator[Finding]:
-    """Blocks that hang above what is below them."""
+    """Blocks with a gap between them and what is below them."""
     for gap in find_gaps(facts.scene.blocks, facts.fit_m):
         message = f"block {gap.order} floats {gap.height_m * 1000:.2f} mm above its support"
         yield _fault(message, gap.order)
@@ -213,7 +213,7 @@ def _distractor(facts: SceneFacts) -> Iterator[Finding]:
     for i, one in enumerate(facts.candidates.candidates if facts.candidates else ()):
         poses = {orientation_class(one.type, euler) for euler in POSES[one.type].values()}
         if one.look not in needed and one.look[2] not in poses:
-            message = f"candidate {i + 1} is not needed and stands as no block of a goal does"
+            message = f"candidate {i + 1} is not needed, and no goal has it in this pose"
             yield _fault(message, field=f"candidates[{i}]", found=one)
 
 
@@ -265,7 +265,7 @@ def is_acceptable(scene: Scene, palette: tuple[Kind, ...]) -> bool:
     found = findings_of(facts, (*FORM, "hidden", *PHYSICS))
     return (
         all(map(is_proven, groups(scene.blocks)))
-        # Runs watch until all is at rest, and a tall column may sway past a limit by then.
+        # Runs simulate until all is at rest, and a tall column may sway past a limit by then.
         and (len(scene) <= MOST_PROVEN or stands(scene.blocks))
         and next(found, None) is None
     )
@@ -289,8 +289,8 @@ def verify_foreign(task: Task, trial: Trial = DEFAULT_TRIAL) -> tuple[Finding, .
 
 
 def check_set(scenes: Sequence[Scene]) -> tuple[Finding, ...]:
-    """Return scenes that equal an earlier one up to quarter turns, mirroring and shifting, and
-    those whose parents are not base scenes of the set.
+    """Return findings on scenes that equal an earlier one up to quarter turns, mirroring and
+    shifting, and on those whose parents are not base scenes of the set.
     """
     found: list[Finding] = []
     first: dict[bytes, str] = {}

@@ -110,7 +110,7 @@ def _making(
 ) -> Iterator[tuple[Workers, Shards | None]]:
     """Open workers for a set with files of these names; `work` describes it.
 
-    Raises StoreError if `out` already has a set, unless it is that of shards that continue.
+    Raises StoreError if `out` already has a set, unless shards continue in it.
     """
     if shard is None or not shards_folder(out).exists():
         files.check_out(out, names)
@@ -217,7 +217,7 @@ def _settled(count: int, levels: Sequence[str], palette: str, exclude: Sequence[
 )
 @_out
 def commit(arguments: tuple[str, ...], public: str, out: Path) -> None:
-    """Commit to a set, by ARGUMENTS of generate, whose seed nobody can choose or know yet.
+    """Commit to a set, given by ARGUMENTS of generate, before anyone can choose or know its seed.
 
     Writes DIR/secret.txt, to be kept, and DIR/commitment.json, to be published: digests of the
     secret, of phyblock's code and of the built-in scenes, and the later public value to use.
@@ -233,7 +233,7 @@ def commit(arguments: tuple[str, ...], public: str, out: Path) -> None:
 def reveal(commitment: Path, secret: Path, public: str) -> None:
     """Print the command that makes the set of a COMMITMENT, once its SECRET is revealed.
 
-    Refuses another secret, code or physics engine than was committed to.
+    Refuses a secret, code or physics engine other than the one committed to.
     """
     arguments, seed = season.reveal(commitment, secret, public)
     settled = _season_arguments(shlex.split(arguments))
@@ -241,7 +241,7 @@ def reveal(commitment: Path, secret: Path, public: str) -> None:
 
 
 def _season_arguments(words: Sequence[str]) -> str:
-    """Return arguments of generate in canonical form. Raises UsageError if they name a seed, a
+    """Return arguments of generate in canonical form. Raises UsageError if they give a seed, a
     folder, or a set that its maker could still change.
     """
     context = generate_scenes.make_context("generate", ["--out", ".", *words])
@@ -407,8 +407,8 @@ def show_scene(data: str, scene: str) -> None:
     default="checkerboard",
     show_default=True,
 )
-@click.option("--composite", is_flag=True, help="Goal and candidates side by side, too.")
-@click.option("--gif", is_flag=True, help="The assembly as an animated GIF, too.")
+@click.option("--composite", is_flag=True, help="Also draw goal and candidates side by side.")
+@click.option("--gif", is_flag=True, help="Also draw the assembly as an animated GIF.")
 @worker_options()
 def render(
     data: str,
@@ -455,7 +455,7 @@ def _composite(task: AssemblyTask, style: PictureStyle) -> bytes:
 def _draw(
     out: Path, drawings: dict[str, Callable[[], bytes]], workers: Workers, shards: Shards | None
 ) -> None:
-    """Draw pictures by their names, and write them where this shard is the one that writes."""
+    """Draw the named pictures, and write them if this shard is the one that writes."""
     drawn = tracked(workers.map(call, drawings.values()), len(drawings), "Drawing")
     for name, picture in zip(drawings, drawn, strict=True):
         if shards is None or shards.writes:
@@ -489,9 +489,9 @@ def _read(path: str, data: str) -> QuestionSet:
     "--per-subtask",
     type=click.IntRange(1),
     metavar="N",
-    help="Questions of each subtask; by default 150, of PD 100.",
+    help="Questions per subtask; by default 150, and 100 for PD.",
 )
-@click.option("--pictures", is_flag=True, help="Draw all pictures into DIR/pictures, too.")
+@click.option("--pictures", is_flag=True, help="Also draw all pictures into DIR/pictures.")
 @_seed
 @worker_options()
 @_out
@@ -612,12 +612,12 @@ def show_question(question: str, path: str, data: str, out: Path | None) -> None
 @_about
 @_data
 def audit(path: str, data: str) -> None:
-    """Audit the questions of PATH: could they be answered without understanding?
+    """Audit the questions of PATH for ways to answer them without understanding.
 
     PATH is a folder with questions.jsonl or a bundled set, by default the built-in phyblock-vqa.
-    Shows by subtask how often each letter is right and the accuracy of three probes on questions
+    Reports by subtask how often each letter is right and the accuracy of three probes on questions
     about base scenes that they did not learn from: the most frequent answer, the texts alone, and
-    simple features of the pictures that are options. Exits with 0, whatever it finds.
+    simple measures of the pictures. Exits with 0, whatever it finds.
     """
     asked = [task.question for task in _read(path, data).tasks]
     subtasks = len({question.subtask for question in asked})

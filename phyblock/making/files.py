@@ -56,7 +56,7 @@ def write_questions(
     pictures: Iterable[str] = (),
 ) -> None:
     """Write questions in their order; `originals` are the scenes as stored, by id, and `pictures`
-    the names of files that are there.
+    the names of picture files that are already there.
     """
     lines = (StoredQuestion.of(q, originals[q.scene.id]).as_json() for q in questions)
     _write(folder, QUESTION_FILES, (card, lines, QUESTION_SET_VERSION), pictures)
@@ -122,7 +122,7 @@ def scene_card(name: str, tasks: _Tasks, command: str, palette: Palette, rejecte
         return sum(scene.parents == (scene.id,) for scene in some)
 
     def row(some: Sequence[Scene]) -> list[object]:
-        """Return numbers of scenes and base scenes; mean and most of what they consist of."""
+        """Return numbers of scenes and base scenes, and mean and maximum of their contents."""
         cells: list[object] = [len(some), bases(some)]
         for counts in (
             [len(scene) for scene in some],

@@ -63,9 +63,9 @@ def commit(folder: Path, arguments: str, public: str) -> tuple[Path, Path]:
 
 
 def reveal(commitment: Path, secret: Path, public: str) -> tuple[str, int]:
-    """Return the arguments and the seed of a season, whose public value is known.
+    """Return the arguments and the seed of a season whose public value is known.
 
-    Raises DataError for another secret, code or engine than was committed to.
+    Raises DataError for a secret, code or engine other than the one committed to.
     """
     where = str(commitment)
     committed = decode(TypeAdapter(Commitment), read_data(commitment), where, Commitment)

@@ -83,7 +83,7 @@ SPOILED = {
     ),
     "hidden": (lambda: SceneFacts(cellar()), "does not show in the goal picture"),
     "candidates": (lambda: offering(lambda _: ()), "that block 1 needs"),
-    "distractor": (lambda: offering(lambda offered: (*offered, STRANGE)), "stands as no block"),
+    "distractor": (lambda: offering(lambda offered: (*offered, STRANGE)), "no goal has it"),
 }
 
 

@@ -1,9 +1,9 @@
-"""Audit of a question set: balance of answers, repeats, and probes that answer blindly.
+"""Audit of a question set: balance of answers, repeated questions, and blind probes.
 
 Two probes learn from questions about other base scenes and answer the rest: one reads only the
 texts (logistic regression over words, numbers and likeness), one measures the pictures without
 knowing what is in them (ridge regression): outlines, colors by height, what an option changes and
-whether something is below that, where marks are. Where either is right much more often than chance,
+whether something is below that, where marks are. If either is right much more often than chance,
 the set gives its answers away.
 """
 
@@ -31,14 +31,14 @@ _SEED, _STRENGTH = 0, 0.05
 
 
 class Probe(NamedTuple):
-    """The number of questions that a probe answered rightly, of `n`."""
+    """The number of questions that a probe answered correctly, of `n`."""
 
     right: int
     n: int
 
     @property
     def accuracy(self) -> float:
-        """Share of questions answered rightly."""
+        """Share of questions answered correctly."""
         return self.right / self.n
 
     @property
@@ -56,8 +56,8 @@ class SubtaskAudit:
 
     `letters` are shares of right answers by letter (ordering: by the letter that comes first),
     `repeats` the questions that ask the same as an earlier one. `probes` are `majority`, `text`
-    and, where options are pictures, places or what follows from a mark, `pictures`, which is told
-    by kind of question as well.
+    and, if options are pictures, places or effects of removing a marked block, `pictures`, which is
+    also reported by kind of question.
     """
 
     subtask: Subtask
@@ -68,7 +68,7 @@ class SubtaskAudit:
     repeats: tuple[str, ...]
 
     def findings(self) -> Iterator[str]:
-        """Yield what is wrong, a sentence each."""
+        """Yield a sentence on each problem."""
         low, high = BALANCE
         if self.subtask != "OR" and not low <= min(self.letters) <= max(self.letters) <= high:
             yield f"{self.subtask}: a letter is right outside {low:.0%} to {high:.0%}"
@@ -81,7 +81,7 @@ class SubtaskAudit:
 def audit_questions(questions: Sequence[Question]) -> Iterator[SubtaskAudit]:
     """Yield an audit of each subtask that has questions, in the paper's order.
 
-    Raises SpecError where scikit-learn, which the text probe uses, is not installed.
+    Raises SpecError if scikit-learn, which the text probe uses, is not installed.
     """
     folds = Folds(questions)
     rules = {"majority": majority_rule, "text": text_rule}
@@ -114,10 +114,10 @@ def audit_questions(questions: Sequence[Question]) -> Iterator[SubtaskAudit]:
 
 
 def text_rule(known: Sequence[Question]) -> Rule:
-    """Learn a logistic regression over the words of question and option, their numbers and
-    likeness: the option that it gives the highest odds. An order is the most frequent one.
+    """Return the rule that picks the option with the highest odds of a logistic regression over
+    words, numbers and likeness of texts; for an order, the most frequent one.
 
-    Raises SpecError where scikit-learn is not installed.
+    Raises SpecError if scikit-learn is not installed.
     """
     majority = majority_rule(known)
     single = [question for question in known if len(question.answer) == 1]
@@ -147,7 +147,7 @@ def text_rule(known: Sequence[Question]) -> Rule:
 
 
 def duplicates_of(questions: Sequence[Question]) -> dict[str, str]:
-    """Return questions that ask what an earlier one asks, whatever the order of options, with the
+    """Return the ids of questions that repeat an earlier one, with options in any order, and the
     id of that one.
     """
     first: dict[str, str] = {}
@@ -156,7 +156,7 @@ def duplicates_of(questions: Sequence[Question]) -> dict[str, str]:
 
 
 def _content(question: Question) -> str:
-    """Everything that a reader of the question sees, its options in no order, as JSON."""
+    """Return everything that a reader of the question sees, with options sorted, as JSON."""
 
     def rounded(numbers: Sequence[float]) -> tuple[float, ...]:
         return tuple(round(number, 6) + 0.0 for number in numbers)
@@ -178,7 +178,7 @@ def picture_probe(questions: Sequence[Question], folds: Folds) -> dict[str, Prob
     """Answer questions by measures of their pictures alone, and return a probe for each kind.
 
     Ridge regression of being right (ordering: of the place in the order), learned from questions
-    of the same kind that share no base scene. Kinds whose options are not seen are left out.
+    of the same kind that share no base scene. Kinds without measures are omitted.
     """
     rows_of = {q.id: measures_of(q) for q in questions}
     kinds: dict[str, list[Question]] = {}
@@ -193,8 +193,8 @@ def picture_probe(questions: Sequence[Question], folds: Folds) -> dict[str, Prob
             known = [q for q in members if folds.is_known(fold, q)]
             if not held_out or len(known) < _FEWEST:
                 continue
-            # The means over the four options are zero, and so is that of what each is worth: the
-            # right one 1 and others 0, or in an order the first most.
+            # Measures and values have a mean of zero over the four options. The right one has the
+            # highest value, or in an order the first one.
             rows = np.vstack([rows_of[q.id] for q in known])
             values = np.zeros((len(known), len(LETTERS)))
             for value, q in zip(values, known, strict=True):

@@ -1,7 +1,7 @@
-"""The base of all question kinds: a maker proposes questions and derives their answers again.
+"""The base of all kinds of questions: a maker proposes questions and derives their answers again.
 
 `StaticMaker.right` and `Maker.rederive` are the only places that decide what is right and what is
-fair: a draft is kept where they find its first option, and `phyblock questions verify` calls them
+fair: a draft is kept if they find its first option, and `phyblock questions verify` calls them
 again for every stored question.
 """
 
@@ -41,7 +41,7 @@ WORDS: Mapping[str, Any] = WORDINGS.pop("words")  # type: ignore[assignment]
 
 
 class UnfairError(PhyblockError):
-    """A question has no answer, more than one, or names what cannot be told from the picture."""
+    """A question has no answer, more than one, or names something that cannot be seen."""
 
 
 @dataclass(frozen=True)
@@ -52,8 +52,8 @@ class Draft:
     the right order. `slots` fill the template of the `wording`. `facts` are further evidence, which
     JSON can hold. Selection takes an even share of each `kind`, by default the wording. `looks` are
     measures of the pictures, a row for each option, by which a reader might guess: drafts are
-    dropped until these tell nothing. Of the same base scenes there is one question of a wording,
-    slots and `about`.
+    dropped until these reveal nothing. The same base scenes have at most one question with the same
+    wording, slots and `about`.
     """
 
     scene: Scene
@@ -68,12 +68,12 @@ class Draft:
 
     @property
     def group(self) -> str:
-        """Its kind, or its wording."""
+        """The kind, or else the wording."""
         return self.kind or self.wording
 
     @property
     def texts(self) -> tuple[str, ...]:
-        """The options as texts; none of pictures and places, whose texts tell nothing."""
+        """The options that are texts; empty for pictures and places, whose texts reveal nothing."""
         return tuple(option for option in self.options if isinstance(option, str))
 
     @property
@@ -83,30 +83,30 @@ class Draft:
 
 
 class Maker(ABC):
-    """Makes the questions of one subtask and can derive an answer again."""
+    """Makes the questions of one subtask, and derives their answers again."""
 
     subtask: Subtask
     count: int = 150
-    """Questions that are made where no other number is asked for."""
+    """Default number of questions."""
     spare: float = 1.5
-    """Scenes are asked until there are so many times the drafts that are wanted."""
+    """Drafts per wanted question; no more scenes are drafted once there are as many."""
     doubtful: float = 1.05
-    """So many times the questions that are wanted are chosen, as some are refused in the end."""
+    """Drafts selected per wanted question, since some are refused in the end."""
     drafts_a_scene: int = 1
-    """The most drafts that are taken of one scene."""
+    """Maximum number of drafts per scene."""
 
     @abstractmethod
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """Propose questions about a scene, in an order drawn with `rng`, without a simulation.
 
-        Of these, those are kept that are selected and whose answer `rederive` finds.
+        A draft is kept if it is selected and `rederive` finds its answer.
         """
 
     @abstractmethod
     def rederive(self, question: Question) -> tuple[int, ...]:
-        """Return the right answer, found anew from scene, pictures and simulator.
+        """Return the right answer, derived again from scene, pictures and simulator.
 
-        Never from `answer`. Raises UnfairError when there is not exactly one, or something named
+        `answer` is never used. Raises UnfairError if there is not exactly one, or something named
         cannot be seen.
         """
 
@@ -114,7 +114,7 @@ class Maker(ABC):
 class Asked(NamedTuple):
     """A question about one picture, not yet answered.
 
-    `options` are in any order; where there are none, the maker offers some once it has the answer.
+    `options` are in any order; if there are none, the maker offers some once it has the answer.
     """
 
     stem: str
@@ -136,14 +136,14 @@ class StaticMaker(Maker):
 
     @abstractmethod
     def ask(self, scene: Scene, view: View, rng: np.random.Generator) -> Iterator[Asked]:
-        """Ask about a scene that is seen from a view, fair or not."""
+        """Propose questions, fair or not, about a scene that is seen from a view."""
 
     @abstractmethod
     def right(self, asked: Asked) -> str:
-        """Return the text of the right option; UnfairError as `rederive`."""
+        """Return the text of the right option. Raises UnfairError as `rederive`."""
 
     def offer(self, asked: Asked, right: str, rng: np.random.Generator) -> Sequence[str]:
-        """Return four options, the right one among them; none where none are drawn."""
+        """Return four options, the right one among them, or none if there are too few."""
         raise NotImplementedError
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
@@ -164,7 +164,7 @@ class StaticMaker(Maker):
                     break
 
     def rederive(self, question: Question) -> tuple[int, ...]:
-        """Return the answer from the one picture and the slots of the text alone."""
+        """Return the answer, derived only from the one picture and the slots of the text."""
         labels = [picture.label for picture in question.pictures]
         if labels != ["scene"]:
             raise UnfairError(f"has pictures {labels}, not one of the scene alone")
@@ -184,7 +184,7 @@ def fill_template(template: str, slots: Slots) -> str:
 
 
 def slots_of(question: Question) -> Slots:
-    """Return the slots of a text; UnfairError unless they fill its wording to that text."""
+    """Return the slots of a text. Raises UnfairError unless its wording with them is the text."""
     slots = question.evidence.get("slots", {})
     try:
         is_filled = fill_template(WORDINGS[question.wording], slots) == question.text
@@ -196,7 +196,7 @@ def slots_of(question: Question) -> Slots:
 
 
 def only_index(right: Sequence[bool | None]) -> tuple[int]:
-    """Return the index of the one option that is right; UnfairError when there is not one."""
+    """Return the index of the right option. Raises UnfairError unless there is exactly one."""
     found = [index for index, is_right in enumerate(right) if is_right]
     if len(found) != 1:
         raise UnfairError(f"{len(found)} of {len(right)} options are right")
@@ -209,7 +209,7 @@ def right_first(right: T, options: Sequence[T]) -> list[T]:
 
 
 def window(rng: np.random.Generator, values: Sequence[int], right: int) -> list[str]:
-    """Return four neighbors among the allowed values, the right one among them, or none."""
+    """Return four neighboring allowed values, the right one among them, or none."""
     if right not in values:
         return []
     start = values.index(right) - int(rng.integers(len(LETTERS)))
@@ -218,21 +218,21 @@ def window(rng: np.random.Generator, values: Sequence[int], right: int) -> list[
 
 
 def pick(rng: np.random.Generator, options: Sequence[T]) -> T:
-    """Return one of the options."""
+    """Return one of the options, each equally likely."""
     return options[int(rng.integers(len(options)))]
 
 
 def shuffled(rng: np.random.Generator, items: Sequence[T]) -> list[T]:
-    """Return the items in an order drawn with `rng`."""
+    """Return the items in random order."""
     return [items[int(i)] for i in rng.permutation(len(items))]
 
 
 ELEVATIONS_DEG = (18, 38)
-"""The views of static questions look down by this much: tops show, and so do sides."""
+"""Range of elevations in static questions: both tops and sides are visible."""
 
 
 def drawn_view(rng: np.random.Generator, elevations_deg: tuple[int, int] = ELEVATIONS_DEG) -> View:
-    """Return a view drawn evenly: from all round, looking down by so much, in whole degrees."""
+    """Return a random view in whole degrees: any azimuth, an elevation within the range."""
     low, high = elevations_deg
     return (float(rng.integers(360)), float(rng.integers(low, high + 1)))
 
@@ -242,18 +242,18 @@ def drawn_view(rng: np.random.Generator, elevations_deg: tuple[int, int] = ELEVA
 
 _WRONG = len(LETTERS) - 1
 _MOST_OFF = 1.0
-"""The most ranks that the right option may be off, on average over the measures."""
+"""Limit on how far the right option is from the wanted ranks, on average over measures."""
 _EQUAL, _UNLIKE_STEPS = 0.02, 5.0
 
 
 def four_alike(
     measures: Floats, unlike: Floats, least: float, rng: np.random.Generator
 ) -> list[int]:
-    """Return row 0, which is right, and three wrong ones, among which it has about the ranks drawn.
+    """Return the indices of row 0, the right one, and three wrong rows that give it random ranks.
 
-    `measures` has shape (n, k). `unlike`, shape (n, n), says how much two differ: any two that are
-    taken do by `least` or more, and the sum over the other three is one more measure. The ranks
-    wanted are those of any one among any four. Empty where none come near.
+    `measures` has shape (n, k). `unlike`, shape (n, n), holds the differences of any two rows:
+    those returned differ by `least` or more, and the sum over the other three is one more measure.
+    The wanted ranks are those of a random row among four. Empty if no ranks come close.
     """
     if len(measures) < len(LETTERS):
         return []
@@ -269,7 +269,7 @@ def four_alike(
 
 
 def ranks_among(measures: Floats, unlike: Floats, right: int, threes: NDArray[np.int64]) -> Floats:
-    """Return how many of each three are below the right one, by measure; equal ones count half."""
+    """Return the number of each three below the right one, by measure; equal ones count half."""
     steps = measures[threes] - measures[right]
     four = np.column_stack([np.full(len(threes), right), threes])
     sums = unlike[four[:, :, None], four[:, None, :]].sum(axis=2)

@@ -1,17 +1,17 @@
-"""CF, PD, AD: what moves when a block goes or comes.
+"""CF, PD, AD: effects of removing or adding blocks.
 
 Questions are proposed by statics alone; simulations confirm those that are selected.
 
-CF: the block that goes supports others of the scene. It is marked in the picture, so that no word
-of the question hints at the answer.
+CF: the removed block supports others of the scene. It is marked in the picture, so that no word of
+the question hints at the answer.
 
-PD: four pictures show the same blocks laid on an unfinished structure, of which one stays. In none,
-one or two of the others the plank hangs over less; by how far all leans off the middle of the
-structure it is about as often any of the four.
+PD: four pictures show the same blocks laid on an unfinished structure; only in one all stay. The
+plank overhangs less in none, one or two of the others; ranked by the distance of the center of mass
+from the middle of the structure, the right picture has each rank about equally often.
 
-AD: what becomes of the block at each of four places is plain to the eye, and checked with margins.
-The right place takes each rank about equally often by how far it is off the middle of its block, by
-height, and by how near something higher is.
+AD: the outcome at each of four places is clear to the eye, and checked with margins. The right
+place has each rank about equally often by distance from the middle of its block, by height, and by
+distance to the nearest higher block.
 """
 
 from __future__ import annotations
@@ -53,17 +53,17 @@ Ints = NDArray[np.int64]
 Lot = frozenset[int]
 """Orders of blocks that move."""
 _ALL_SEEN = 0.12
-"""The least visible share of every block of a structure."""
-# The support graph is asked again for every block of a structure.
+"""Minimum visible share of every block of a structure."""
+# The support graph is needed again for every block of a structure.
 _below = functools.lru_cache(maxsize=64)(support_graph)
 
-# What statics and simulation say
+# Verdicts of statics and simulation
 
 _LIFT_M, _DIRECTIONS = 0.6, 8
 
 
 def lowered(block: Block, onto: Sequence[Block], x_m: float, y_m: float) -> Block:
-    """Return the block let down, as it is turned, with the middle of its outline over (x, y) [m].
+    """Return the block lowered in its orientation, the middle of its outline over (x, y) [m].
 
     It stops where it first touches one of the blocks, or the floor.
     """
@@ -76,7 +76,7 @@ def lowered(block: Block, onto: Sequence[Block], x_m: float, y_m: float) -> Bloc
 
 
 def lowered_round(put: Block, onto: Sequence[Block], radius_m: float) -> Iterator[Block]:
-    """Yield the block let down anew all round, so far off [m] in eight directions."""
+    """Yield the block lowered again at this distance [m] in each of eight directions."""
     x, y, _ = bounds_m(put).mean(axis=0).tolist()
     for number in range(_DIRECTIONS):
         angle = 2 * math.pi * number / _DIRECTIONS
@@ -84,7 +84,7 @@ def lowered_round(put: Block, onto: Sequence[Block], radius_m: float) -> Iterato
 
 
 def surely_stays(blocks: Sequence[Block], order: int) -> bool | None:
-    """True if by statics one of the blocks and all that touches it stay; None where unsure."""
+    """True if by statics one of the blocks and all near it stay; None if unsure."""
     group = group_of(blocks, order)
     if is_balanced(group):
         return True if surely_stands(group) else None
@@ -92,7 +92,7 @@ def surely_stays(blocks: Sequence[Block], order: int) -> bool | None:
 
 
 def stays_round(put: Block, onto: Sequence[Block], radius_m: float) -> bool | None:
-    """True if by statics a block let down stays, and likewise all round; None where unsure."""
+    """True if by statics a lowered block stays, here and all around; None if unsure."""
     stays = surely_stays((*onto, put), put.order)
     is_alike = stays is not None and all(
         is_balanced(group_of((*onto, moved), moved.order)) is stays
@@ -102,19 +102,19 @@ def stays_round(put: Block, onto: Sequence[Block], radius_m: float) -> bool | No
 
 
 def verdict(blocks: Sequence[Block], order: int) -> bool | None:
-    """True if all stay; None where statics leave a doubt or settings of a simulation disagree."""
+    """True if all stay; None if statics are unsure or simulations do not confirm them."""
     stays = surely_stays(blocks, order)
     return stays if stays is not None and holds(blocks, order) is stays else None
 
 
 def group_of(blocks: Sequence[Block], order: int) -> tuple[Block, ...]:
-    """Return the blocks in reach of one, itself among them."""
+    """Return the blocks in reach of one, including that one."""
     return next(group for group in groups(blocks) if any(b.order == order for b in group))
 
 
 def lots_of(blocks: Sequence[Block]) -> list[list[Block]]:
-    """Return the blocks in lots; of every block of a lot of several, one rests on it or is below
-    it. Blocks that only touch side by side are of different lots: one may fall without the other.
+    """Return the blocks in lots, each connected by blocks that rest on each other. Blocks that only
+    touch side by side are in different lots: one may fall without the other.
     """
     lots: list[set[int]] = []
     for order, below in support_graph(blocks).items():
@@ -125,10 +125,10 @@ def lots_of(blocks: Sequence[Block]) -> list[list[Block]]:
 
 
 def is_sure(left: Sequence[Block], moved: Collection[int]) -> bool:
-    """True if blocks just left to themselves surely do what a simulation says.
+    """True if statics are sure of the outcome of a simulation.
 
-    Those that stay stand without those that go, and each lot of those that go cannot be borne
-    by those that stay: with every weight 5 mm off to any side, other masses, and friction to spare.
+    The blocks that stay stand without the moved ones, and cannot hold any lot of these: with every
+    weight 5 mm off to any side, other masses, and friction to spare.
     """
     still = [block for block in left if block.order not in moved]
     falling = lots_of([block for block in left if block.order in moved])
@@ -140,8 +140,8 @@ def is_sure(left: Sequence[Block], moved: Collection[int]) -> bool:
 def resting_on(blocks: Sequence[Block], order: int, *, only: bool = False) -> Lot:
     """Return the orders of the blocks that rest on a block, directly or not, without its own.
 
-    With `only` they rest on nothing but it and others that do. The naive rule says that these, or
-    those, fall when it is taken away, and nothing else.
+    With `only`, they rest on nothing else. Naive rules say that exactly these blocks, with or
+    without `only`, fall when it is removed.
     """
     found: Lot = frozenset({order})
     for _ in blocks:
@@ -156,17 +156,17 @@ def resting_on(blocks: Sequence[Block], order: int, *, only: bool = False) -> Lo
 # CF
 
 TAKEN = "X"
-"""The letter of the block that is taken away."""
+"""The letter of the removed block."""
 OUTCOME_TEXTS: tuple[str, ...] = tuple(base.WORDS["outcomes_of_removal"])
-"""Outcomes of a removal, by the number of other blocks that do not stay; all are offered."""
+"""Outcomes of a removal, by the number of other blocks that move; all are offered."""
 _VIEWS_TRIED, _REMOVALS_TRIED = 3, 4
 _MOST_LOTS, _MOST_TOGETHER = 40, 3
 _COLORS = tuple(itertools.permutations(sight.PLAIN_COLORS))
-"""The colors of what moves, of what stays, and of the block that is taken away."""
+"""The colors of blocks that move, of blocks that stay, and of the removed block."""
 
 
 class CounterfactualMaker(Maker):
-    """Kinds: `cf-count` (texts) and `cf-color` (what moves, by colors)."""
+    """Kinds: `cf-count` (texts) and `cf-color` (pictures that highlight the blocks that move)."""
 
     subtask: Subtask = "CF"
     spare, doubtful = 6.0, 1.3
@@ -177,7 +177,7 @@ class CounterfactualMaker(Maker):
         carrying = frozenset[int]().union(*_below(scene.blocks).values())
         asked = [block.order for block in scene.blocks if block.order in carrying]
         for order in shuffled(rng, asked)[:_REMOVALS_TRIED]:
-            # From a view that shows all blocks, with the one that goes marked.
+            # From a view that shows all blocks, with the removed block marked.
             for _ in range(_VIEWS_TRIED):
                 plain = QuestionPicture("scene", scene.blocks, base.drawn_view(rng))
                 mark = drawn.block_mark(plain, seen(plain), order, TAKEN)
@@ -237,7 +237,7 @@ def _outcome_text(count: int) -> str:
 
 
 def falling(blocks: Sequence[Block], order: int) -> Lot | None:
-    """Return the orders of the blocks that by statics move when one goes; None where unsure.
+    """Return the orders of the blocks that by statics move when one is removed; None if unsure.
 
     These are blocks next to it, with all that rests on them.
     """
@@ -254,7 +254,7 @@ def falling(blocks: Sequence[Block], order: int) -> Lot | None:
 
 
 def balances_on_edges(blocks: Sequence[Block], order: int, moved: Lot) -> bool:
-    """True if a block that rested on the one that goes stays on edges alone: no one can tell."""
+    """True if a block that rested on the removed one stays on edges alone: nobody can tell."""
     still = [block for block in blocks if block.order not in moved | {order}]
     flat = support_graph(still, only_areas=True)
     return any(
@@ -263,7 +263,7 @@ def balances_on_edges(blocks: Sequence[Block], order: int, moved: Lot) -> bool:
 
 
 def _joined(lots: Sequence[Lot], most: int, enough: int | None = None) -> set[Lot]:
-    """Return the unions of up to so many lots, and of none; of fewer where these are enough."""
+    """Return the unions of 0 to `most` lots; of fewer if these give more than `enough`."""
     found = {frozenset[int]()}
     for number in range(1, most + 1):
         found |= {frozenset[int]().union(*some) for some in itertools.combinations(lots, number)}
@@ -275,8 +275,8 @@ def _joined(lots: Sequence[Lot], most: int, enough: int | None = None) -> set[Lo
 def _by_colors(
     shown: QuestionPicture, order: int, moved: Lot, rng: np.random.Generator
 ) -> tuple[Sequence[str], tuple[QuestionPicture, ...]] | None:
-    """Return colors, and four pictures that color what moves, or in three what could and does not:
-    some blocks, with all that rests on them.
+    """Return colors, and four pictures that highlight blocks: first those that move, then three
+    other sets with all that rests on them. None if none are found.
     """
     plain = replace(shown, marks=())
     share, left = sight.shares(plain), [b for b in plain.blocks if b.order != order]
@@ -297,7 +297,7 @@ def _by_colors(
 
 
 def _looks_of_lot(plain: QuestionPicture, taken: int, lot: Lot) -> tuple[float, ...]:
-    """Return area, number and place of what is colored, and how far it is from the naive rules."""
+    """Return area, number and place of highlighted blocks, and differences from naive rules."""
     shot = seen(plain)
     vertices = [i for i, block in enumerate(plain.blocks) if block.order in (lot or {taken})]
     rows, columns = np.nonzero(np.isin(shot.block, vertices))
@@ -311,15 +311,15 @@ def _looks_of_lot(plain: QuestionPicture, taken: int, lot: Lot) -> tuple[float, 
     )
 
 
-# PD: structures of the data set stand at every step, few of their blocks rest on more than they
-# need, and none is held by a weight. So planks with weights are laid on them.
+# PD: structures of the data set stand at every step, few of their blocks have more supports than
+# they need, and none is held down by a weight. So planks with weights are laid on them.
 
 SPARE_M = 0.0005
-"""Further than the margin of statics a lever decides, as positions are rounded [m]."""
+"""Added to the margin of statics around the support, since positions are rounded [m]."""
 UNIT_M = 0.0125
-"""The step of places along a plank [m]."""
+"""Step between places along a plank [m]."""
 THIN_M, WIDE_M, _PILLAR_OFF_M = 0.025, 0.05, 0.0125
-"""Thickness of pillars [m], and how far off the middle of a top thin ones stand."""
+"""Thicknesses of pillars, and offset of thin ones from the middle of a top [m]."""
 _FLAT: Euler = (0.0, 0.0, 0.0)
 WEIGHTS: tuple[tuple[BlockType, Euler], ...] = (
     *(("cube", _FLAT), ("cylinder", _FLAT), ("cuboid2", (0.0, 90.0, 0.0))),
@@ -331,7 +331,7 @@ _FLAT_M, _LEAST_TOP_M, _HIGHEST_M = 0.0005, 0.045, 0.2
 
 
 class Bench(NamedTuple):
-    """A structure nearly done, with loose blocks to lay along one line over a flat top of it.
+    """A nearly finished structure, with loose blocks to lay along a line over one of its flat tops.
 
     The first loose block is a plank that lies on the top, the others are weights on the plank: a
     balance, or a cantilever held by a weight. `reach_m` is half the length of the top along the
@@ -347,8 +347,8 @@ class Bench(NamedTuple):
     masses_kg: Floats
 
     def laid(self, offs_m: Sequence[float]) -> tuple[Block, ...] | None:
-        """Return all blocks, the loose ones so far off the middle of the top [m]; None where they
-        overlap.
+        """Return all blocks, the loose ones at these offsets from the middle of the top [m]; None
+        if any overlap.
         """
         middle, blocks = bounds_m(self.top).mean(axis=0), self.base
         for block, off_m in zip(self.loose, offs_m, strict=True):
@@ -359,20 +359,20 @@ class Bench(NamedTuple):
 
     @property
     def limits_m(self) -> tuple[float, float]:
-        """So far off the middle [m] weights may lean and surely stay; from so far on they fall."""
+        """Offsets of the center of mass [m] up to which all stay, and from which they fall."""
         return self.reach_m - MARGIN_M - SPARE_M, self.reach_m + MARGIN_M + SPARE_M
 
     @property
     def middle_m(self) -> float:
-        """Distance of the middle of the structure from that of the top, along the line [m]."""
+        """Offset of the middle of the structure from that of the top, along the line [m]."""
         ends = np.array([bounds_m(block)[:, self.along] for block in self.base])
         top = bounds_m(self.top)[:, self.along]
         return float((ends.min() + ends.max()) / 2 - top.mean())
 
     def plans_m(self, count: int, rng: np.random.Generator) -> Floats:
-        """Return places for the loose blocks, off the middle of the top, (plans, blocks) [m].
+        """Return random offsets of loose blocks from the middle of the top, (plans, blocks) [m].
 
-        These are drawn so often, and left out where two weights are in one place.
+        `count` plans are drawn, and those with two weights in one place are left out.
         """
         half = int(self.lengths_m[0] / UNIT_M / 2)
         steps = rng.integers(1 - half, half, size=(count, len(self.loose)))
@@ -383,13 +383,13 @@ class Bench(NamedTuple):
         return plans
 
     def leans_m(self, plans_m: Floats) -> Floats:
-        """Return how far off the middle of the top the weight is, by the plan [m]."""
+        """Return the offset of the center of mass from the middle of the top, by plan [m]."""
         leans: Floats = plans_m @ self.masses_kg / self.masses_kg.sum()
         return leans
 
 
 def free_tops(blocks: Sequence[Block]) -> list[Block]:
-    """Return the blocks with a flat top, square to the axes and not too high, on which nothing
+    """Return the blocks, square to the axes and not too high, with a flat top on which nothing
     rests.
     """
     carrying = {order for block in blocks for order in block.depend}
@@ -411,7 +411,7 @@ def is_square(block: Block) -> bool:
 
 @functools.cache
 def pillars(along: int, thick_m: float) -> list[Turned]:
-    """Return blocks to lay a plank on, with their poses, so thick along an axis."""
+    """Return blocks to lay a plank on, in poses with this thickness along an axis."""
     return [
         (block_type, euler)
         for block_type in ("cuboid1", "cuboid2")
@@ -428,9 +428,9 @@ def bench(
     first: int,
     rng: np.random.Generator,
 ) -> Bench:
-    """Return a bench on a top, with a plank and so many weights, whose orders begin with `first`.
+    """Return a bench on a top, with a plank and this number of weights, with orders from `first`.
 
-    Where a pillar is asked for, of a thickness above 0, the plank lies on that.
+    If `pillar_m` is above 0, the plank lies on a pillar of this thickness.
     """
     along = int(rng.integers(2))
     if pillar_m:
@@ -456,19 +456,19 @@ _BENCHES_TRIED, _SHOWN, _ONE_STAYS = 80, 60, [True, False, False, False]
 _ELEVATIONS_DEG = (20, 38)
 _LEAST_ACROSS, _ON_A_PILLAR = 0.5, 0.8
 _LEAN = 2.0 * math.tan(math.radians(LEAN_DEG))
-"""The right plank also stays on a floor that leans twice as far as those of simulations, where
-blocks are let go at once.
+"""Slope of a floor on which the right plank also stays: twice the tilt of simulations, which
+release all blocks at once.
 """
 _LEANS = ((_LEAN, 0.0), (-_LEAN, 0.0), (0.0, _LEAN), (0.0, -_LEAN))
 _PLANS, _FOURS = 400, 4000
 _OVER = (0, 1, 1, 2, 2, 2)
-"""Ranks of the right plank that are asked for; the higher, the harder to find."""
+"""Wanted ranks of the right plank's overhang; the higher, the harder it is to find."""
 Ranks = tuple[int, int]
-"""Of how many of the other options two measures are below that of the right one."""
+"""The number of other options below the right one, in two measures."""
 
 
 class PredictiveMaker(Maker):
-    """Kind: `pd-next`, the next step after which all stays."""
+    """Kind: `pd-next`, the next step after which all blocks stay."""
 
     subtask: Subtask = "PD"
     count = 100
@@ -476,7 +476,7 @@ class PredictiveMaker(Maker):
     drafts_a_scene = 3
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
-        """Propose stages of building and ways to go on, of which one stays."""
+        """Propose unfinished structures and next steps, only one of which stays in place."""
         for _ in range(self.drafts_a_scene):
             ranks = (pick(rng, _OVER), int(rng.integers(len(LETTERS))))
             tried = (_next_steps(scene, ranks, rng) for _ in range(_BENCHES_TRIED))
@@ -499,7 +499,7 @@ class PredictiveMaker(Maker):
 
 
 def _next_steps(scene: Scene, ranks: Ranks, rng: np.random.Generator) -> Draft | None:
-    """Return a question about a bench drawn on a scene nearly done, if it has such plans."""
+    """Return a question about a bench on a nearly finished scene, or None if none was found."""
     order = scene.graph.random_order(rng)
     kept = len(order) - int(rng.integers(min(_MOST_LEFT_OUT, max(len(order) - 2, 0)) + 1))
     stages = tuple(scene.blocks[vertex] for vertex in sorted(order[:kept]))
@@ -530,11 +530,11 @@ def _next_steps(scene: Scene, ranks: Ranks, rng: np.random.Generator) -> Draft |
 
 
 def four_plans(on: Bench, ranks: Ranks, rng: np.random.Generator) -> list[list[float]]:
-    """Return four plans, of which by a lever, with margins, all stays in the first only; empty
-    where none are found.
+    """Return four plans, or none: in the first, the center of mass is over the support, in the
+    others beyond it, with margins.
 
-    Its ranks are by how far the plank hangs over, and by how far all leans off the middle of the
-    structure.
+    The first has these ranks by the overhang of the plank, and by the distance of the center of
+    mass from the middle of the structure.
     """
     near, far = on.limits_m
     plans = on.plans_m(_PLANS, rng)
@@ -549,8 +549,8 @@ def four_plans(on: Bench, ranks: Ranks, rng: np.random.Generator) -> list[list[f
 
 
 def one_stays(stays: NDArray[np.bool_], falls: NDArray[np.bool_], rng: np.random.Generator) -> Ints:
-    """Return fours drawn, (n, 4), of which the first stays and the others fall; none where there
-    are no such.
+    """Return random fours, (n, 4), of which the first stays and the others fall; empty if there are
+    none.
     """
     if not stays.any() or not falls.any():
         return np.empty((0, len(LETTERS)), dtype=np.int64)
@@ -559,7 +559,7 @@ def one_stays(stays: NDArray[np.bool_], falls: NDArray[np.bool_], rng: np.random
 
 
 def ranks_of(fours: Floats) -> Ints:
-    """Return how many of each four, (n, 4), are below the first; -1 where one is equal to it."""
+    """Return the number of each four, (n, 4), below the first; -1 if one is equal to it."""
     steps = fours[:, 1:] - fours[:, :1]
     is_apart = (np.abs(steps) >= SPARE_M).all(axis=1)
     return np.where(is_apart, (steps < 0).sum(axis=1), -1)
@@ -570,23 +570,23 @@ def ranks_of(fours: Floats) -> Ints:
 Place = tuple[float, float, float]
 """A point of the world [m]."""
 STAYS, IN_THE_WAY, TIPS = range(1, 4)
-"""What happens to a block that is set down: it stays; it comes down on a neighbor first, and tips
-off that; it tips what it is set on."""
+"""Outcomes of setting a block down: it stays; it lands on a neighbor first, and tips off that; it
+tips the block that it is set on."""
 _PLACE_RING_M, _WIDE_RING_M = 0.005, 0.01
-"""The verdict on a place holds all round it, this far off; in proposals farther [m]."""
+"""Distances around a place at which its verdict holds, too: in answers and in proposals [m]."""
 _STRUCTURES_TRIED, _AREA_M2, _ROUND_PX = 60, 0.0003, 2
 _MOST_OF_SCENE, _ADDED, _BESIDE = 3, (8, 13), (0, 2)
-"""The most blocks that are taken of a scene; how many are added, and beside or on each plank."""
+"""Maximum number of blocks of a scene; ranges of blocks added, and beside or on each plank."""
 _LONG: tuple[BlockType, ...] = ("cuboid2", "cuboid3")
 _SET_DOWN = [(one, euler) for one in _LONG for euler in SHAPES[one].poses.values()]
-"""The blocks that are set down, with their poses."""
+"""The blocks to set down, with their poses."""
 _AWAY_M, _GAPS_M, _ODDS_ON = (0.075, 0.125), (0.0, 0.0125, 0.025, 0.0375), 0.25
 _SIDES_OF_SCENE = [(x, y) for x, y in itertools.product((-1, 0, 1), repeat=2) if x or y]
 _PILLARS_M: tuple[tuple[tuple[float, ...], float], ...] = (
     *(((-0.005,), THIN_M), ((0.005,), THIN_M), ((-0.0175,), WIDE_M), ((0.0175,), WIDE_M)),
     *(((-0.05, 0.05), THIN_M), ((-0.0375, 0.05), THIN_M), ((-0.05, 0.05), WIDE_M), ((), THIN_M)),
 )
-"""How far off the middle of a plank its pillars are, and how thick."""
+"""Offsets of pillars from the middle of a plank, and their thickness [m]."""
 _VIEWED_FROM_DEG, _PLAINLY_ACROSS, _HANGS_M, _HELD_M = (24, 38), 0.85, 0.02, 0.0075
 _INSIDE_M, _CLEAR_M = 0.01, 0.025
 _OVER_M, _OUT_M, _LEANS_OUT_M, _OFF_CONTACT_M = 0.005, 0.0225, 0.0075, 0.01
@@ -601,14 +601,14 @@ class AffordanceMaker(Maker):
     drafts_a_scene = 3
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
-        """Propose a block in a pose drawn, one place where it stays, and three where not."""
+        """Propose a block in a random pose, a place where it stays, and three where it does not."""
         for _ in range(self.drafts_a_scene):
             rank = int(rng.integers(len(LETTERS)))
             tried = (_set_down(scene, rank, rng) for _ in range(_STRUCTURES_TRIED))
             yield from itertools.islice(filter(None, tried), 1)
 
     def rederive(self, question: Question) -> tuple[int, ...]:
-        """Decide by statics and simulation of the block at every place, and statics all round."""
+        """Decide by statics and simulation at every place, and by statics all around it."""
         slots = base.slots_of(question)
         shown, alone = (
             sight.picture_of(question, "scene"),
@@ -618,7 +618,7 @@ class AffordanceMaker(Maker):
             raise UnfairError("the second picture is not of one block")
         block = alone.blocks[0]
         if slots.get("size") != _size(block):
-            raise UnfairError("the block is not as large as told")
+            raise UnfairError("the block does not have the size that the text gives")
         sight.require_seen(shown, _ALL_SEEN)
         plain, stays = replace(shown, marks=()), []
         for letter in LETTERS:
@@ -633,7 +633,7 @@ class AffordanceMaker(Maker):
 
 
 def _set_down(scene: Scene, rank: int, rng: np.random.Generator) -> Draft | None:
-    """Return a question about places on part of a scene and on planks round it, if there is one.
+    """Return a question about places on part of a scene and on planks around it, or None.
 
     Of the three wrong places, `rank` are nearer to the middle of their block than the right one.
     """
@@ -641,8 +641,8 @@ def _set_down(scene: Scene, rank: int, rng: np.random.Generator) -> Draft | None
     across = np.abs(view_axes(*view)[0])
     if across.max() < _PLAINLY_ACROSS:
         return None
-    # The first blocks of the scene, and planks set up round them. Those planks that hang over a
-    # pillar do so along the axis that runs across the view.
+    # The first blocks of the scene in some order, and planks set up around them. Planks that
+    # overhang a single pillar do so along the axis that runs across the view.
     count, more = int(rng.integers(2, _MOST_OF_SCENE + 1)), int(rng.integers(*_ADDED))
     blocks = tuple(scene.blocks[i] for i in sorted(scene.graph.random_order(rng)[:count]))
     low, high = whole_bounds_m(blocks)[:, :2]
@@ -675,8 +675,8 @@ def _set_down(scene: Scene, rank: int, rng: np.random.Generator) -> Draft | None
 def _with_plank(
     blocks: tuple[Block, ...], at_m: Floats, first: int, across: int, rng: np.random.Generator
 ) -> tuple[Block, ...]:
-    """Return blocks with a plank on up to two pillars, and further ones beside it or on it; as they
-    were where one of these would not plainly stay.
+    """Return blocks with a plank on up to two pillars, and others beside it or on it; unchanged if
+    one of these would not clearly stay.
     """
     offs_m, thick_m = pick(rng, _PILLARS_M)
     along = across if len(offs_m) == 1 else int(rng.integers(2))
@@ -712,8 +712,8 @@ class Points(NamedTuple):
 
 
 def points_of(plain: QuestionPicture, rng: np.random.Generator) -> Points:
-    """Return points drawn on flat tops of boxes, well inside, where the picture shows them, what
-    bears the box, and, from the side, how far it hangs over.
+    """Return random points well inside the flat tops of boxes, where the picture shows the point,
+    the supports of the box, and, from the side, its overhang.
     """
     below, shot = _below(plain.blocks), seen(plain).block
     across = np.abs(view_axes(*plain.view_deg)[0][:2])
@@ -739,25 +739,25 @@ def points_of(plain: QuestionPicture, rng: np.random.Generator) -> Points:
 
 
 def outcomes_of(blocks: tuple[Block, ...], block: Block, points: Points) -> Ints:
-    """Return what plainly happens to a block set down at each point; 0 where that is not plain.
+    """Return the clear outcome of setting a block down at each point; 0 if it is not clear.
 
-    A person can tell by eye that the block keeps 2.5 cm from all that is higher than the point, or
-    overlaps something by as much; and that what it is set on has supports under the point, or on
-    both sides of it, or bears nothing else and has none within 2.25 cm.
+    A person can see that the block keeps 2.5 cm from everything higher than the point, or overlaps
+    something by as much; and that the block below has supports under the point, or on both sides
+    of it, or carries nothing else and has no support within 2.25 cm.
     """
     boxes = np.array([bounds_m(one) for one in blocks])
     (low, high), at = (boxes[:, i, :2] for i in (0, 1)), points.at_m[:, None]
     half = np.ptp(bounds_m(block), axis=0)[:2] / 2
 
     def meets(reach_m: Floats | float, above_m: float = _SAME_HEIGHT_M) -> NDArray[np.bool_]:
-        """True for points as near to a block that is so much higher, (points,)."""
+        """True for points within reach of a block that is higher by `above_m`, (points,)."""
         near = (low < at[..., :2] + reach_m) & (high > at[..., :2] - reach_m)
         is_met = near.all(axis=2) & (boxes[:, 1, 2] > at[..., 2] + above_m)
         return np.asarray(is_met.any(axis=1))
 
     is_clear = ~meets(half + _CLEAR_M)
     is_blocked = meets(half - _CLEAR_M, _CLEARLY_HIGHER_M) & ~meets(_OFF_CONTACT_M)
-    # Whether what it is set on holds.
+    # Stability of the block that it is set on.
     below, xy = _below(blocks), points.at_m[:, :2]
     borne = np.array([_borne_by(one, blocks, below) for one in blocks])[points.on].swapaxes(0, 1)
     masses = np.array([SHAPES[one.type].mass_kg for one in (block, *blocks)])
@@ -771,7 +771,7 @@ def outcomes_of(blocks: tuple[Block, ...], block: Block, points: Points) -> Ints
 
 
 def _borne_by(block: Block, blocks: Sequence[Block], below: sight.Below) -> Floats:
-    """Return the corners (2, 2) of the box round what bears a block, seen from above [m]."""
+    """Return the corners (2, 2) of the box around a block's supports, seen from above [m]."""
     box = bounds_m(block)[:, :2]
     under = [bounds_m(one)[:, :2] for one in blocks if one.order in below[block.order]]
     if GROUND in below[block.order] or not under:
@@ -782,7 +782,7 @@ def _borne_by(block: Block, blocks: Sequence[Block], below: sight.Below) -> Floa
 
 
 def _out_m(at_m: Floats, low_m: Floats, high_m: Floats) -> Floats:
-    """Return how far points are outside of boxes seen from above, below 0 inside [m]."""
+    """Return the distance of points outside of boxes seen from above, below 0 inside [m]."""
     outside: Floats = np.maximum(low_m - at_m[:, :2], at_m[:, :2] - high_m).max(axis=1)
     return outside
 
@@ -790,15 +790,15 @@ def _out_m(at_m: Floats, low_m: Floats, high_m: Floats) -> Floats:
 def four_of(
     plain: QuestionPicture, points: Points, outcomes: Ints, rank: int, rng: np.random.Generator
 ) -> tuple[list[int], str]:
-    """Return points on four blocks, of which the first is right, and their kind; empty where there
+    """Return points on four blocks, of which the first is right, and their kind; empty if there
     are none.
 
-    The kind has the ranks of the right one: the given one by how far it is off the middle of its
-    block, by height, and by how far the nearest block is that is higher.
+    The kind has the ranks of the right one: `rank` by distance from the middle of its block, then
+    by height, and by distance to the nearest higher block.
     """
     falls, tips = outcomes > STAYS, int((outcomes == TIPS).sum())
     if tips:
-        # As many where it tips as where something is in the way.
+        # At most as many points where something is in the way as where it tips.
         falls[rng.permutation(np.flatnonzero(outcomes == IN_THE_WAY))[tips:]] = False
     fours = one_stays(outcomes == STAYS, falls, rng)
     pixels = np.array([mark_pixel(plain, at) for at in points.at_m.tolist()]).reshape(-1, 2)
@@ -806,7 +806,7 @@ def four_of(
     apart = np.array([np.linalg.norm(pixels[i] - pixels[j], axis=1) for i, j in pairs])
     is_other = np.array([points.on[i] != points.on[j] for i, j in pairs])
     fours = fours[(apart.min(axis=0) >= drawn.MARKS_APART_PX) & is_other.all(axis=0)]
-    # Points less than half a millimeter apart in a measure come in an order drawn.
+    # Points that are nearly equal in a measure come in random order.
     boxes, at_m = np.array([bounds_m(block) for block in plain.blocks]), points.at_m
     off_m = np.linalg.norm((at_m - boxes.mean(axis=1)[points.on])[:, :2], axis=1)
     gaps_m = np.maximum(boxes[:, 0] - at_m[:, None], at_m[:, None] - boxes[:, 1])[..., :2]
@@ -825,16 +825,16 @@ def four_of(
 
 
 def _size(block: Block) -> str:
-    """Return length, width and height of a block as it is turned, to half a centimeter."""
+    """Return length, width and height of a block in its orientation, to half a centimeter."""
     *level, high = (round(float(side) * 200) / 2 for side in np.diff(bounds_m(block), axis=0)[0])
     return f"{max(level):g} by {min(level):g} cm, {high:g} cm high"
 
 
 @functools.lru_cache(maxsize=64)
 def stays_at(plain: QuestionPicture, block: Block, at: Place) -> bool | None:
-    """True if the block stays at a place, by simulation too, and likewise up to 5 mm off.
+    """True if the block stays at a place, by simulation too, and by statics 5 mm around it.
 
-    None where that is not sure, and where it stays on something else than what is marked.
+    None if that is not sure, or if it stays on something other than the marked block.
     """
     put = lowered(block, plain.blocks, *at[:2])
     stays = stays_round(put, plain.blocks, _PLACE_RING_M)

@@ -1,7 +1,7 @@
-"""By what someone might guess the answer of a question without understanding it.
+"""Features by which someone might guess an answer without understanding the question.
 
-Of texts, words and numbers; of pictures, simple measures. Drafts are dropped until these tell
-nothing (`keeping_odds`), and the audit learns from them.
+Texts have words and numbers, pictures have simple measures. Drafts are dropped until these reveal
+nothing (`keeping_odds`), and the probes of the audit learn from them.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ _NUMBER = re.compile(r"\d+(?:\.\d+)?")
 
 
 def measures_of(question: Question) -> Floats:
-    """Measures of each option beside the others, shape (options, measures); empty without any.
+    """Return measures of options relative to each other, shape (options, measures), or (0, 0).
 
-    Deviations from the mean of the options in standard deviations, and the absolute values of
-    these less their mean.
+    These are deviations from the mean of the options in standard deviations, and the absolute
+    values of these less their mean; for a block marked X, products of text and place.
     """
     pictures = {picture.label: picture for picture in question.pictures}
     scene = pictures.get("scene")
@@ -46,7 +46,7 @@ def measures_of(question: Question) -> Floats:
     elif start and marks.keys() >= set(LETTERS):
         values = np.array([_of_place(start, marks[letter]) for letter in LETTERS])
     elif start and "X" in marks:
-        # The same texts are offered each time: what a place says is learned for each text.
+        # The same texts are always offered: the effect of a place is learned for each of them.
         about = np.array([1.0, *_of_place(start, marks["X"])])
         offered = sorted(question.options)
         each = [np.eye(len(offered))[offered.index(option)] for option in question.options]
@@ -96,7 +96,7 @@ def _colors_by_height(shot: Shot) -> Floats:
 
 
 def _of_place(start: Shot, at: tuple[int, int]) -> list[float]:
-    """Return where a mark is in the structure, and how much shows of its block and around it."""
+    """Return measures of a mark's place in the structure and in the visible part of its block."""
     rows, columns = np.nonzero(start.block >= 0)
     mine = start.block == start.block[at]
     room = np.hypot(*(np.argwhere(~mine) - at).T).min(initial=SEEN_PX) / SEEN_PX
@@ -115,7 +115,7 @@ def _of_place(start: Shot, at: tuple[int, int]) -> list[float]:
 
 
 def _extent(mask: Mask) -> list[float]:
-    """Area, mean row and column, and extents of a mask [pixels]; zeros where it is empty."""
+    """Return area, mean row and column, and extents of a mask [pixels]; zeros if it is empty."""
     rows, columns = np.nonzero(mask)
     if not len(rows):
         return [0.0] * 5
@@ -123,12 +123,12 @@ def _extent(mask: Mask) -> list[float]:
 
 
 def text_features(text: str, options: Sequence[str]) -> list[Mapping[str, float]]:
-    """Return features of each option beside one another and the text that asks, by name; 0 where a
-    name is missing.
+    """Return features of each option relative to the others and to the question's text, by name; a
+    missing one is 0.
 
-    These are the shortcuts that multiple-choice questions are known for: words that are right
-    often, the largest or the middle number, the option that shares most with the others, the
-    longest one. Letters are not among them: how often each is right is counted, not learned.
+    These are the known shortcuts of multiple-choice questions: words that are often right, the
+    largest or the middle number, the option that shares most with the others, the longest one.
+    Letters are not among them: the share of each is counted, not learned.
     """
     words = [_WORD.findall(option.lower()) for option in options]
     asked = set(_WORD.findall(text.lower()))
@@ -173,16 +173,16 @@ def _overlap(one: Sequence[str], other: Sequence[str]) -> float:
 
 _STEPS, _RATE, _PENALTY = 60, 0.3, 2.0
 _FITTED = 2000
-"""So many drafts are learned from at most, spread over the pool."""
+"""Maximum number of drafts to learn from, spread over the pool."""
 
 
 def keeping_odds(drafts: Sequence[Draft]) -> Floats:
-    """Return the probability with which each draft is kept; 1 where there is nothing to guess by.
+    """Return the probability with which each draft is kept; 1 if there is nothing to guess by.
 
-    A reader without pictures learns from half of the base scenes, and guesses at the other half: a
-    logistic regression of greatest penalized likelihood, by steps of AdaGrad (Duchi et al. 2011).
+    A logistic regression of maximum penalized likelihood, fitted to half of the base scenes by
+    AdaGrad (Duchi et al. 2011), guesses the answers about the other half.
     """
-    # SciPy takes a while to import, which commands that choose nothing do without.
+    # SciPy takes a while to import, and only the selection of drafts needs it.
     from scipy import sparse  # type: ignore[import-untyped]
 
     odds = np.ones(len(drafts))
@@ -192,7 +192,7 @@ def keeping_odds(drafts: Sequence[Draft]) -> Floats:
     halves = [[i for i in telling if half_of[base_of[i]] == half] for half in (0, 1)]
 
     def table(chosen: Sequence[int], names: dict[str, int], grows: bool) -> sparse.csr_matrix:
-        """Return the features of all options, four rows a draft; new names are added or dropped."""
+        """Return the features of options, four rows per draft; new names are added or dropped."""
         values, columns, starts = list[float](), list[int](), [0]
         for features in (row for i in chosen for row in _features(drafts[i])):
             known = {name: x for name, x in features.items() if grows or name in names}
@@ -226,7 +226,7 @@ def _chances(scores: Floats) -> Floats:
 
 
 def _features(one: Draft) -> Iterator[Mapping[str, float]]:
-    """Yield what a reader sees of each option, as it is and for its kind, beside the others."""
+    """Yield the features of each option; those of texts are also given for its kind alone."""
     if one.looks:
         for row in one.looks:
             yield {f"{one.wording}: {i}": x for i, x in enumerate(row)}

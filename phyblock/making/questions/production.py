@@ -1,12 +1,12 @@
-"""Questions of all subtasks from a seed: drafts, a choice of them, letters; answers found again.
+"""Questions of all subtasks from a seed: drafts, their selection, letters, and answers found again.
 
-Answers are drawn, what a reader sees beside them is evened out. Drafts of each kind are taken in
-turns from all scenes, so that none counts for more than another. Of these, chance leaves out some
-until the texts of those kept tell nothing of what is right (`keeping_odds`). Of those the greedy
-choice takes, out of a hundred or so at a time, the one that evens out best what was taken so far.
-Where options are texts it goes by what the text itself says alone, kind, wording and set of
-options: to choose by the scene as well would choose answers, for large scenes have larger numbers,
-and to even out answers would make what is right often in some questions rare in the others.
+Answers are random; what a reader sees beside them is balanced. Drafts of each kind are taken from
+all scenes in turn, so that no scene dominates. Some of these are dropped at random until texts
+and simple measures of the others reveal nothing (`keeping_odds`). From those, a greedy selection
+takes the one of a hundred or so at a time that best balances those taken so far. For options that
+are texts it considers only kind and set of options: selecting by scene as well would select
+answers, since large scenes have larger numbers, and balancing answers would make those that are
+often right in some questions rare in others.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ MAKERS: dict[Subtask, Maker] = {
 }
 """The makers of questions, by subtask; plugins add theirs."""
 _LEAST_FILLED = 0.05
-"""The least share of a picture that its blocks fill."""
+"""Minimum share of a picture that its blocks fill."""
 _DIGITS = 6
 _PLACES = range(len(LETTERS))
 
@@ -57,15 +57,14 @@ def make_questions(
 ) -> list[Question]:
     """Return the questions, subtask by subtask; the same for the same arguments.
 
-    Drafts of a scene depend on seed, subtask and scene alone; what is taken of them, and which
-    letter is right, on seed and subtask. `track` may show progress: it is given what is drafted,
-    the number of scenes and a title. Raises DataError that names every subtask of which the scenes
-    give too few.
+    Drafts of a scene depend only on seed, subtask and scene; their selection and the right letters
+    are drawn by seed and subtask. `track` may show progress: it gets the items, their number and a
+    title. Raises DataError that names every subtask for which the scenes give too few questions.
     """
     questions: list[Question] = []
     short = []
     for subtask, count in wanted.items():
-        # In an order drawn, one of each level in turn.
+        # In random order, one of each level in turn.
         turns: Counter[int] = Counter()
         ranked = []
         for scene in shuffled(_rng(seed, subtask), scenes):
@@ -86,7 +85,7 @@ def make_questions(
         if len(taken) < count:
             message = f"the scenes give no more than {len(taken)} of {count} questions"
             short.append(Problem(subtask, message, hint="ask for fewer, or give more scenes"))
-        # In an order drawn, with letters that are drawn and about as often right.
+        # In random order, with random letters that are right about equally often.
         width, letters = max(3, len(str(len(taken)))), even_letters(len(taken), rng)
         for number, (one, right) in enumerate(zip(shuffled(rng, taken), letters, strict=True), 1):
             rest = shuffled(rng, [place for place in _PLACES if place != right])
@@ -99,9 +98,9 @@ def make_questions(
 
 
 def scene_drafts(task: tuple[Subtask, int, Scene]) -> list[Draft]:
-    """Return the drafts of a subtask, by a seed, about a scene; they depend on nothing else.
+    """Return the drafts of a subtask about a scene; they depend only on these and the seed.
 
-    They have measures of their pictures, by which the one right option might stand out.
+    Except for orders, they have measures of pictures by which the right option might stand out.
     """
     subtask, seed, scene = task
     maker, drafts = MAKERS[subtask], list[Draft]()
@@ -120,7 +119,7 @@ def _rng(seed: int, *parts: str) -> np.random.Generator:
 def as_question(
     name: str, subtask: Subtask, draft: Draft, places: Sequence[int], background: Background
 ) -> Question:
-    """Return a draft with its options dealt: `places` says of each, in order, where it goes."""
+    """Return the question of a draft; `places` are those of its options, in their order."""
     options: list[str] = [""] * len(places)
     pictures = list(draft.pictures)
     for place, option in sorted(zip(places, draft.options, strict=True), key=lambda one: one[0]):
@@ -152,7 +151,7 @@ def _rounded(vector: tuple[float, ...]) -> Any:
 
 
 def _tidy(picture: QuestionPicture) -> QuestionPicture:
-    """Return the picture with its numbers as the file holds them, and orders that rise."""
+    """Return the picture with numbers as in the file, and blocks sorted by their orders."""
 
     def tidy(block: Block) -> Block:
         place, angles = _rounded(block.position_m), _rounded(block.euler_deg)
@@ -168,10 +167,10 @@ def _tidy(picture: QuestionPicture) -> QuestionPicture:
 
 
 def problem_of(question: Question) -> str | None:
-    """Return what is wrong with a question, in one sentence; None when its answer was found."""
+    """Return the problem of a question in one sentence, or None if its answer was found again."""
     maker = MAKERS.get(question.subtask)
     if maker is None:
-        return "its subtask is made by no rule"
+        return "its subtask has no maker"
     small = [one.label for one in question.pictures if filled(one) < _LEAST_FILLED]
     if small:
         return f"blocks fill less than {_LEAST_FILLED:.0%} of the pictures {small}"
@@ -185,20 +184,20 @@ def problem_of(question: Question) -> str | None:
     return None
 
 
-# The choice among drafts
+# Selection of drafts
 
 _LOOKED_AT = 100
 _SPREAD = 20
-"""So many times the drafts that are wanted of a kind are looked at, where the pool has them,"""
+"""Number of drafts considered per wanted one of a kind, if the pool has as many."""
 _SPARE = 1.2
-"""and so many times the drafts that are wanted are kept at the least."""
+"""Minimum number of drafts kept per wanted one."""
 BALANCE = (0.22, 0.28)
-"""Shares of right answers that every letter is to stay within."""
+"""Limits of the share of right answers for each letter."""
 
 
 def select(pool: Sequence[Draft], count: int, rng: np.random.Generator) -> list[Draft]:
-    """Return at most `count` drafts, no two of one view, or the same question of base scenes."""
-    # Of each kind, one of each scene in turns, several times those wanted.
+    """Return at most `count` drafts, no two with one view or the same question of base scenes."""
+    # For each kind, one of each scene in turn, several times as many as wanted.
     turns: dict[str, list[tuple[int, int]]] = defaultdict(list)
     of_scene: Counter[tuple[str, str]] = Counter()
     for i in rng.permutation(len(pool)).tolist():
@@ -220,7 +219,7 @@ def select(pool: Sequence[Draft], count: int, rng: np.random.Generator) -> list[
     counts: Counter[tuple[Hashable, Hashable]] = Counter()
 
     def cost(one: Draft) -> float:
-        """Return the unevenness that a further draft adds to those taken; the lower the better."""
+        """Return the imbalance that a further draft adds to those taken; the lower the better."""
         cost = 0.0
         for group, member, weight in _even(one):
             others = [counts[group, other] for other in members[group]]
@@ -242,7 +241,7 @@ def select(pool: Sequence[Draft], count: int, rng: np.random.Generator) -> list[
 
 
 def _even(draft: Draft) -> Iterator[tuple[Hashable, Hashable, float]]:
-    """Yield groups, the draft's member of each, and weights: members should be as frequent."""
+    """Yield groups, the draft's member of each, and weights; members should be equally frequent."""
     yield "kind", draft.group, 6.0
     if texts := draft.texts:
         yield ("options", draft.group), frozenset(texts), 0.2
@@ -252,7 +251,7 @@ def _even(draft: Draft) -> Iterator[tuple[Hashable, Hashable, float]]:
 
 
 def _identities(draft: Draft) -> list[Hashable]:
-    """Return what no other question may share: scene and view, or base scenes and what is asked."""
+    """Return keys that no two questions share: scene and view, or base scenes and content."""
     asked = (draft.scene.parents, draft.wording, tuple(sorted(draft.slots.items())), draft.about)
     views = [("view", draft.scene.id, one.view_deg) for one in draft.pictures[:1]]
     return [asked, *views]
@@ -261,10 +260,10 @@ def _identities(draft: Draft) -> list[Hashable]:
 def even_letters(count: int, rng: np.random.Generator) -> list[int]:
     """Return indices of the letters that are right, each share within `BALANCE`.
 
-    Of few questions the share that is nearest to it. Exactly equal shares would give the letters
-    of some questions away by those of the others.
+    For few questions, shares may be just outside. With exactly equal shares, the letters of some
+    questions would reveal those of the others.
     """
-    # Rounded, as 0.28 of 150 is a little more than 42 in floating point.
+    # Rounded, since 0.28 of 150 is a little more than 42 in floating point.
     low, high = (round(share * count, 6) for share in BALANCE)
     while True:
         drawn = rng.integers(len(LETTERS), size=count)

@@ -1,8 +1,8 @@
-"""SH, CO, SI: shape, color and size of a block. NU, OC, LC, TC: how many blocks, layers or shapes.
+"""SH, CO, SI: shape, color and size of a block. NU, OC, LC, TC: numbers of blocks, layers, shapes.
 
-Scenes are recolored, so that neither color nor shape tells the other. For sizes, blocks are named
-by color and side, because a shape's name would tell its size. What is counted is what the picture
-tells.
+Scenes are recolored, so that neither color nor shape reveals the other. For sizes, blocks are named
+by color and side, because a shape's name would reveal its size. Counts go by what the picture
+shows.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from phyblock.making.questions.base import Asked, Slots, StaticMaker, UnfairErro
 from phyblock.sim.contact import GROUND, bounds_m, support_graph
 
 _LYING_M = 0.03
-"""A half cylinder that lies on its flat face is lower than this."""
+"""Height below which a half cylinder lies on its flat face [m]."""
 _PAIRS_TRIED = 8
 _FURTHER: Sequence[sight.Feature] = ("side", "layer", "support")
-"""What names of blocks speak of besides color or type."""
+"""Features that names of blocks use besides color or type."""
 
 
 class ShapeMaker(StaticMaker):
@@ -36,7 +36,7 @@ class ShapeMaker(StaticMaker):
     subtask: Subtask = "SH"
 
     def ask(self, scene: Scene, view: View, rng: np.random.Generator) -> Iterator[Asked]:
-        """Ask about each block that can be named, in colors drawn anew."""
+        """Ask about each block that can be named, in newly drawn colors."""
         for order in base.shuffled(rng, sight.orders_of(scene.blocks)):
             shown = sight.recolored(scene, rng)
             picture = sight.goal_picture(shown, view)
@@ -58,20 +58,20 @@ class ShapeMaker(StaticMaker):
 
 
 def _said(name: str) -> str:
-    """Return what a name says besides color and shape."""
+    """Return the feature that a name uses besides color and shape, if any."""
     return next((word for word in ("most", "layer", "resting") if word in name), "")
 
 
 class ColorMaker(StaticMaker):
     """CO: the colors of two blocks that are named by anything but a color.
 
-    There are no four colors that everybody tells apart, but there are six pairs of three colors.
+    No four colors can be told apart by everybody, but three colors make six ordered pairs.
     """
 
     subtask: Subtask = "CO"
 
     def ask(self, scene: Scene, view: View, rng: np.random.Generator) -> Iterator[Asked]:
-        """Ask about pairs of blocks that can be named, one of them at most as the outermost."""
+        """Ask about pairs of blocks that can be named, at most one of them as the outermost."""
         for _ in range(_PAIRS_TRIED):
             shown = sight.recolored(scene, rng)
             picture = sight.goal_picture(shown, view)
@@ -90,7 +90,7 @@ class ColorMaker(StaticMaker):
         return " and ".join(block.color for block in blocks)
 
     def offer(self, asked: Asked, right: str, rng: np.random.Generator) -> Sequence[str]:
-        """Return four of the six orders of two colors in the picture, the right one among them."""
+        """Return four of the six ordered pairs of colors in the picture, with the right one."""
         colors = sorted({block.color for block in asked.picture.blocks})
         pairs = [" and ".join(two) for two in itertools.permutations(colors, 2)]
         others = base.shuffled(rng, [pair for pair in pairs if pair != right])
@@ -109,18 +109,18 @@ _COMPARISONS: Mapping[str, tuple[str, Callable[[Block], float], int]] = {
     "the most space": ("si-volume", lambda block: SHAPES[block.type].volume_m3, 1),
     "the least space": ("si-volume", lambda block: SHAPES[block.type].volume_m3, -1),
 }
-"""Stems of wordings, measures, and whether most or least of them is asked for."""
+"""Stem of the wording, measure, and 1 to ask for the most of it or -1 for the least."""
 _LEAST_RATIO, _EXACT, _TRIES = 1.3, 0.01, 6
 _TIMES: Mapping[str, float] = base.WORDS["times_as_tall"]
 
 
 class SizeMaker(StaticMaker):
-    """SI: the one of four blocks that is the tallest, longest, largest; how many times as tall."""
+    """SI: the tallest, longest or largest of four blocks; the ratio of the heights of two."""
 
     subtask: Subtask = "SI"
 
     def ask(self, scene: Scene, view: View, rng: np.random.Generator) -> Iterator[Asked]:
-        """Compare four blocks, and two, in turns."""
+        """Compare four blocks and two blocks in turn."""
         studied = sight.seen_blocks(sight.goal_picture(scene, view), sight.STUDIED)
         for number in range(2 * _TRIES if len(studied) > 1 else 0):
             is_choice = number % 2 == 0
@@ -162,7 +162,7 @@ class SizeMaker(StaticMaker):
         return asked.options[sizes.index(most)]
 
     def offer(self, asked: Asked, right: str, rng: np.random.Generator) -> Sequence[str]:
-        """Return four neighbors of the five ratios."""
+        """Return four neighboring ratios of the five."""
         words = list(_TIMES) if asked.stem == "si-times" else []
         start = pick(rng, [i for i in (0, 1) if right in words[i : i + 4]])
         return words[start : start + 4]
@@ -179,10 +179,10 @@ _WEDGED_M = 0.005
 
 
 def layers_of(blocks: Sequence[Block]) -> Mapping[int, int]:
-    """Return the layer of each block, by order: one more than that of the highest block under it.
+    """Return the layer of each block, by order: one more than the highest layer it rests on.
 
-    UnfairError where that is not what the picture tells: a block that is wedged between two
-    slopes rests on them, and yet it looks as if it were beside them.
+    Raises UnfairError if the picture suggests another one: a block that is wedged between two
+    slopes rests on them, yet it looks as if it were beside them.
     """
     below = support_graph(blocks)
     top = {block.order: bounds_m(block)[1, 2] for block in blocks} | {GROUND: 0.0}
@@ -210,12 +210,12 @@ def layers_of(blocks: Sequence[Block]) -> Mapping[int, int]:
 
 
 def sure_blocks(picture: QuestionPicture) -> int:
-    """Count the blocks that have to be there, going by what the picture shows.
+    """Count the blocks that must be there, judging by the picture.
 
-    Every block shows at least `COUNTED` of itself, but one at the most that shows less. That
-    one is sure to be there, whatever it is, where a block that shows `NAMED` of itself rests on it
-    alone: without it, that block would float. UnfairError where more are hidden, or nothing tells
-    of it.
+    At least the share `COUNTED` of each block is visible, except for at most one. That one must be
+    there, whatever it is, if a block of which `NAMED` is visible rests on it alone, and would
+    otherwise float. Raises UnfairError if more blocks are hidden, or nothing shows that one is
+    needed.
     """
     seen = sight.shares(picture)
     hidden = [order for order, share in seen.items() if share < sight.COUNTED]
@@ -255,9 +255,9 @@ def _layer_numbers(picture: QuestionPicture) -> list[Slots]:
 class Tally:
     """One way of counting.
 
-    `count` says how many there are, and raises UnfairError where that cannot be told from the
-    picture; `values` are those offered; `slots` are those that a text about a picture can have.
-    `is_recolored` where the kit's colors would tell too much, or too few blocks have names.
+    `count` returns the number, and raises UnfairError if the picture does not show it; `values` are
+    the numbers offered; `slots` returns those that a text about a picture can have. `is_recolored`
+    if the kit's colors would reveal too much, or would give too few blocks a name.
     """
 
     count: Callable[[QuestionPicture, Slots], int]
@@ -299,7 +299,7 @@ TALLIES: Mapping[str, Tally] = {
         lambda p, _: len({b.kind for b in _shaped(p)}), range(2, 15), is_recolored=True
     ),
 }
-"""By stem of the wordings."""
+"""Tallies by the stem of their wordings."""
 
 
 class TallyMaker(StaticMaker):
@@ -327,7 +327,7 @@ class TallyMaker(StaticMaker):
         return str(TALLIES[asked.stem].count(asked.picture, asked.slots))
 
     def offer(self, asked: Asked, right: str, rng: np.random.Generator) -> Sequence[str]:
-        """Return four numbers that follow one another."""
+        """Return four consecutive numbers."""
         return base.window(rng, TALLIES[asked.stem].values, int(right))
 
 
@@ -335,15 +335,15 @@ _COUNTS, _TEXTS_TRIED = range(1, 11), 8
 
 
 class NumberMaker(StaticMaker):
-    """NU: how many blocks are of a color, a shape, or both.
+    """NU: the number of blocks of a color, a shape, or both.
 
-    Where color counts, four numbers are drawn, one of them, and so many blocks are colored.
+    If color counts, four numbers and the right one of them are drawn, then blocks are colored.
     """
 
     subtask: Subtask = "NU"
 
     def ask(self, scene: Scene, view: View, rng: np.random.Generator) -> Iterator[Asked]:
-        """Ask for a color, a shape, or both, in colors drawn anew."""
+        """Ask for a color, a shape, or both, in newly drawn colors."""
         for _ in range(_TEXTS_TRIED):
             color, *others = sight.palette(rng)
             kind = pick(rng, ("color", "shape", "both"))
@@ -368,7 +368,7 @@ class NumberMaker(StaticMaker):
                 yield Asked("nu", shown, picture, {"what": what}, options, kind)
 
     def right(self, asked: Asked) -> str:
-        """Count the blocks that `red blocks`, `cubes` or `red cubes` speaks of."""
+        """Count the blocks that a text such as `red blocks`, `cubes` or `red cubes` names."""
         what, picture = asked.slots["what"], asked.picture
         first, _, rest = what.partition(" ")
         color, noun = (first, rest) if first in COLORS else ("", what)

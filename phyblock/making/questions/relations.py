@@ -1,4 +1,4 @@
-"""RP, AP, RD, RR: where blocks are to one another, how far apart, which rests on which, how turned.
+"""RP, AP, RD, RR: relative places, distances, supports and rotations of blocks.
 
 Scenes are recolored so that most blocks have a name. RR: a loose block beside the structure lies as
 a block of the structure would after a turn: about the vertical, or about some axis.
@@ -25,13 +25,13 @@ from phyblock.sim.camera import view_axes
 from phyblock.sim.contact import bounds_m, boxes_near, support_graph, whole_bounds_m
 
 _RECOLORED = 6
-"""So many times the blocks of a view are given other colors, and with these other names."""
+"""Number of times that the blocks of a view get other colors, and so other names."""
 
 
 def _named(
     scene: Scene, view: View, rng: np.random.Generator, least: int
 ) -> Iterator[tuple[Scene, QuestionPicture, Mapping[int, str]]]:
-    """Yield the scene in other colors, its picture, and the names of blocks, `least` or more."""
+    """Yield the scene in other colors, its picture, and the names of `least` or more blocks."""
     for _ in range(_RECOLORED):
         shown = sight.recolored(scene, rng)
         picture = sight.goal_picture(shown, view)
@@ -41,7 +41,7 @@ def _named(
 
 
 def _pairs(items: Sequence[T], rng: np.random.Generator) -> list[tuple[T, T]]:
-    """Return a few pairs of different items."""
+    """Return up to three random pairs of different items."""
     return base.shuffled(rng, list(itertools.permutations(items, 2)))[:3]
 
 
@@ -60,11 +60,11 @@ _CLEAR_M, _ABOVE_M, _LEVEL_M, _GAP_M = 0.03, 0.015, 0.005, 0.024
 _SIDES = ("farthest to the left", "farthest to the right")
 _RANKED = ("rp-highest", "rp-lowest", "rp-front", "rp-back")
 _NEARER = 0.75
-"""The nearest block is at most this share of the next one's distance away."""
+"""Maximum distance of the nearest block, as a share of that of the next one."""
 
 
 class PositionMaker(StaticMaker):
-    """RP: where one block is from another as seen in the picture; the outermost, the nearest."""
+    """RP: a block's place as seen from another one in the picture; the outermost, the nearest."""
 
     subtask: Subtask = "RP"
 
@@ -119,16 +119,16 @@ class PositionMaker(StaticMaker):
 
 
 def _floor_axes(view: View) -> tuple[Floats, Floats]:
-    """Return to the right of the picture, and away from the viewer along the floor, unit (3,)."""
+    """Return unit vectors (3,) to the right, and away from the viewer along the floor."""
     right, _, forward = view_axes(*view)
     away = np.array([forward[0], forward[1], 0.0])
     return right, away / np.linalg.norm(away)
 
 
 def _place(stem: str, one: Block, other: Block, view: View) -> int:
-    """Return which of the places of a wording `one` is at, as the viewer sees it from `other`.
+    """Return the index of the wording's place at which `one` is, as seen in the view from `other`.
 
-    UnfairError for all between these places.
+    Raises UnfairError if it is between these places.
     """
     step = sight.center_m(one) - sight.center_m(other)
     across, away = (float(step @ axis) for axis in _floor_axes(view))
@@ -149,7 +149,7 @@ def _place(stem: str, one: Block, other: Block, view: View) -> int:
 
 _SIDE_M, _EXACT_CM = 0.001, 0.1
 _SCALES: Sequence[BlockType] = ("cube", "cylinder", "arch")
-"""Types whose size the prompt says; one of them is to be seen."""
+"""Types whose size the prompt gives; one of them must be visible."""
 _STEP_CM = 2.5
 
 
@@ -157,7 +157,7 @@ def _apart(one: Block, other: Block, blocks: Sequence[Block]) -> float:
     x, y, _ = np.abs(sight.center_m(one) - sight.center_m(other)).tolist()
     if min(x, y) > _SIDE_M:
         raise UnfairError("the blocks stand askew, so that their distance cannot be counted")
-    # The two belong to one structure, by what rests on what.
+    # The two must belong to one structure, connected by supports.
     reached: set[int] = set()
     found = {one.order}
     while found:
@@ -175,20 +175,20 @@ LENGTHS: Mapping[str, Callable[[Block, Block, Sequence[Block]], float]] = {
     "ap-apart": _apart,
     "ap-rise": lambda one, other, _: abs(_top_m(one) - _top_m(other)),
 }
-"""By kind, of a block, another, and all blocks; UnfairError for what cannot be determined."""
+"""Lengths [m] by kind, from a block, another, and all blocks; UnfairError for unclear ones."""
 _HEIGHTS = ("ap-top", "ap-bottom")
-"""Asked of one block; together they are one kind of three."""
+"""Lengths of one block; together they count as one of three kinds."""
 _LADDERS_CM = (
     *((2.5, 5, 7.5, 10), (5, 7.5, 10, 12.5), (7.5, 10, 12.5, 15), (10, 12.5, 15, 20)),
     *((12.5, 15, 20, 25), (15, 20, 25, 30)),
 )
-"""Lengths that are options together: few fours, so that of each any length is as often right."""
+"""Sets of options [cm]: few, so that within each every length is right equally often."""
 
 
 class DistanceMaker(StaticMaker):
     """AP: heights and distances in centimeters, on the blocks' grid.
 
-    A block whose size the prompt says is in the picture as the scale.
+    A block whose size the prompt gives is in the picture as the scale.
     """
 
     subtask: Subtask = "AP"
@@ -219,7 +219,7 @@ class DistanceMaker(StaticMaker):
         return f"{on_grid_cm:g} cm"
 
     def offer(self, asked: Asked, right: str, rng: np.random.Generator) -> Sequence[str]:
-        """Return four lengths that may stand together."""
+        """Return one of the sets of four lengths that hold the right one."""
         fours = [[f"{length:g} cm" for length in four] for four in _LADDERS_CM]
         fitting = [four for four in fours if right in four and asked.stem in LENGTHS]
         return pick(rng, fitting) if fitting else ()
@@ -241,7 +241,7 @@ class DependencyMaker(StaticMaker):
     subtask: Subtask = "RD"
 
     def ask(self, scene: Scene, view: View, rng: np.random.Generator) -> Iterator[Asked]:
-        """Ask about one block with four to choose from, drawn again and again."""
+        """Ask about a random block, with four others to choose from."""
         below = support_graph(scene.blocks)
         for shown, picture, named in _named(scene, view, rng, 5):
             for stem, is_related in base.shuffled(rng, [*_RELATIONS.items()]):
@@ -268,7 +268,7 @@ class DependencyMaker(StaticMaker):
 
 _STEP_DEG, _LONGER = 15, 1.3
 AXIS_TURNS: tuple[str, ...] = tuple(base.WORDS["turns_about_axes"])
-"""Turns of a block that lies along the ground; the side does not matter."""
+"""Turns of a block that lies along the ground; their direction does not matter."""
 _OFFERED: Mapping[str, Sequence[str]] = {
     "rr-angle": ("0 degrees", "30 degrees", "60 degrees", "90 degrees"),
     "rr-turn": (
@@ -282,17 +282,17 @@ _COMPARED, _BESIDE = 6, 3
 
 @functools.lru_cache(maxsize=4096)
 def _is_alike(block_type: BlockType, one_deg: Euler, other_deg: Euler) -> bool:
-    """True if no one can tell two orientations of a type apart."""
+    """True if two orientations of a type look the same."""
     one, other = (orientation_class(block_type, deg) for deg in (one_deg, other_deg))
     return bool(np.abs(np.array(one) - np.array(other)).max() < _SAME_ANGLE)
 
 
 def images(stem: str, block: Block) -> Sequence[tuple[str, Euler]]:
-    """Return what can be said of turns that a wording is about, each with the orientation to which
-    it takes the block. UnfairError for a block that has no length to turn about.
+    """Return phrases for the turns of a wording, each with the orientation that it gives the block.
+    Raises UnfairError if the wording needs a long axis that the block does not have.
     """
     if stem == "rr-axis":
-        # The level axis of the world that its longest side runs along.
+        # The horizontal axis of the world along its longest side.
         sides = np.diff(bounds_m(block), axis=0)[0]
         first, second = sorted(range(3), key=lambda axis: -sides[axis])[:2]
         if first == 2 or sides[first] < _LONGER * sides[second] or block.euler_deg[2] % 90:
@@ -309,7 +309,7 @@ def images(stem: str, block: Block) -> Sequence[tuple[str, Euler]]:
 
 @functools.lru_cache(maxsize=4096)
 def _tipped(euler_deg: Euler, along: int) -> Sequence[tuple[str, Euler]]:
-    """Return each turn about an axis, to either side, with the orientation that it gives."""
+    """Return each turn about an axis, in either direction, with the orientation it gives."""
     rotation = euler_deg_to_matrix(euler_deg)
     found = [(AXIS_TURNS[0], euler_deg)]
     for name, axis in zip(AXIS_TURNS[1:], (2, along, 1 - along), strict=True):
@@ -323,16 +323,16 @@ def _tipped(euler_deg: Euler, along: int) -> Sequence[tuple[str, Euler]]:
 
 
 def phrases(stem: str, block: Block, other: Block) -> Collection[str]:
-    """Return what can be said truly of how a block is turned compared with another of its type.
+    """Return the phrases that are true of a block's rotation compared with another of its type.
 
-    Nothing, if it is not. UnfairError as `images`.
+    Empty if its type differs or does not fit the wording. Raises UnfairError as `images`.
     """
     if block.type != other.type or (stem == "rr-axis" and not SHAPES[block.type].is_long):
         return ()
     fits = functools.partial(_is_alike, block.type, block.euler_deg)
     if stem != "rr-axis":
-        # A question of an angle is asked of blocks that half a turn maps to themselves, one of a
-        # turn of blocks that none does.
+        # Angles are asked for blocks that only half a turn maps to themselves, turns for blocks
+        # that no turn does.
         own = [fits(deg) for _, deg in images(stem, block)]
         half = len(own) // 2
         if own[half] is not (stem == "rr-angle") or sum(own) != 1 + own[half]:
@@ -341,12 +341,12 @@ def phrases(stem: str, block: Block, other: Block) -> Collection[str]:
 
 
 class RotationMaker(StaticMaker):
-    """RR: a block of the structure, and a loose one of its type beside it that lies otherwise."""
+    """RR: the rotation of a loose block compared with one of its type in the structure."""
 
     subtask: Subtask = "RR"
 
     def ask(self, scene: Scene, view: View, rng: np.random.Generator) -> Iterator[Asked]:
-        """Ask about blocks, with another put beside the structure so that a phrase comes out."""
+        """Ask about blocks, with a loose one beside the structure that fits a random phrase."""
         studied = sight.seen_blocks(sight.goal_picture(scene, view), sight.STUDIED)
         for other, stem in itertools.product(base.shuffled(rng, studied)[:_COMPARED], _OFFERED):
             try:
@@ -357,14 +357,14 @@ class RotationMaker(StaticMaker):
                 continue
             phrase = pick(rng, _OFFERED[stem])
             fitting = [one for one, words in said.items() if words == {phrase}]
-            # Where some phrase cannot come out, others would be right too often.
+            # If some phrase cannot be true, others would be right too often.
             if set().union(*said.values()) != set(_OFFERED[stem]) or not fitting:
                 continue
             for _ in range(_BESIDE):
                 loose = put_beside(pick(rng, fitting), scene.blocks, rng)
                 if not surely_stands((loose,)):
                     continue
-                # Each of the two in a color of its own.
+                # Each of the two gets its own color.
                 every = replace(scene, blocks=(*scene.blocks, loose))
                 shown = sight.with_own_colors(every, [loose.order, other.order], rng)
                 color = {block.order: block.color for block in shown.blocks}
@@ -388,9 +388,9 @@ class RotationMaker(StaticMaker):
 
 
 def put_beside(block: Block, blocks: Sequence[Block], rng: np.random.Generator) -> Block:
-    """Put the block, as it is oriented, on the ground in a direction drawn from the blocks' middle.
+    """Put the block, in its orientation, on the ground in a random direction from the others.
 
-    It gets an order that none of them has, and stands as near to them as leaves 2 cm free.
+    It gets an unused order, and is as near to the other blocks as leaves 2 cm free.
     """
     middle = whole_bounds_m(blocks).mean(axis=0)
     angle = float(rng.uniform(0, 2 * math.pi))

@@ -1,8 +1,8 @@
-"""Facts that a picture tells of its blocks: how much of each shows, where, and words that fit one.
+"""Facts that a picture shows: the visible share and place of each block, and names of blocks.
 
-An expression is `[side] [color] noun [in layer N] [resting on the [color] noun]`. What a reader
-understands by it is computed from the text again by `resolve`, so that a question can be checked
-from its words alone.
+An expression is `[side] [color] noun [in layer N] [resting on the [color] noun]`. `resolve` finds
+what it means to a reader from the text again, so that a question can be checked from its words
+alone.
 """
 
 from __future__ import annotations
@@ -26,32 +26,32 @@ from phyblock.sim.pictures import PictureStyle, drawn_m, goal_camera, shoot, vis
 from phyblock.sim.question_pictures import is_inside, least_difference, seen, seen_order
 
 COUNTED = 0.25
-"""The least visible share of a block that is to be counted."""
+"""Minimum visible share of a block that is counted."""
 NAMED = 0.4
-"""The least visible share of a block that is named in a question or an option."""
+"""Minimum visible share of a block that is named in a question or an option."""
 STUDIED = 0.55
-"""The least visible share of a block whose shape, size or orientation is asked about."""
+"""Minimum visible share of a block whose shape, size or orientation is asked about."""
 LEAST_PIXELS = 220
-"""In so many pixels of 256 by 256 any two pictures that are compared differ, at the least."""
+"""Minimum number of pixels, of 256 by 256, in which any two compared pictures differ."""
 _SHAPED, _SHAPED_AREA = 0.28, 0.004
-"""The least visible share of every block, and share of the picture, where shapes are counted."""
+"""Minimum visible share of every block, and share of the picture, if shapes are counted."""
 _LEAST_PROFILE = 0.26
-"""The sine of 15 degrees: so far the face that shows a block's profile is turned to the viewer."""
+"""Sine of the least angle by which a block's profile is turned to the viewer: 15 degrees."""
 _SIZE_PX = 256
 _MIDDLE_GAP, _EDGE_GAP = 0.1, 0.05
-"""So much further out, of half the picture's width, are middle and edge of an outermost block."""
+"""Minimum lead of the outermost block's middle and edge, in halves of the picture's width."""
 _SAME_M, _SAME_DEG = 0.002, 2.0
 
 
 PLAIN_COLORS: tuple[Color, ...] = ("red", "yellow", "blue")
-"""Colors that everybody tells apart, for marks of what is meant."""
+"""Colors that everybody can tell apart, to highlight blocks."""
 
 
 def palette(rng: np.random.Generator) -> list[Color]:
-    """Return three colors, in an order drawn, that everybody tells apart: at least 20 lie between
-    any two in CIELAB, also for people who are blind to red or green.
+    """Return three colors, in random order, that everybody can tell apart: any two differ by at
+    least 20 in CIELAB, also for people who are blind to red or green.
 
-    Of red, orange and green there is one at most, and green is too near to yellow.
+    So at most one of red, orange and green is possible, and green is too close to yellow.
     """
     return shuffled(rng, (pick(rng, ("red", "orange")), *PLAIN_COLORS[1:]))
 
@@ -67,13 +67,13 @@ def block_of(blocks: Sequence[Block], order: int) -> Block:
 
 
 def colored(blocks: Sequence[Block], colors: Mapping[int, Color]) -> tuple[Block, ...]:
-    """Return the blocks, each in its color by order, if it has one there."""
+    """Return the blocks, those with a new color by their order in that color."""
     return tuple(replace(block, color=colors.get(block.order, block.color)) for block in blocks)
 
 
 def recolored(scene: Scene, rng: np.random.Generator) -> Scene:
-    """Return the scene with one of three colors drawn for every block, so that color tells no
-    shape.
+    """Return the scene with each block in a random one of three colors, so that colors do not
+    reveal shapes.
     """
     colors = palette(rng)
     drawn = [colors[i] for i in rng.integers(len(colors), size=len(scene))]
@@ -97,13 +97,13 @@ def goal_picture(scene: Scene, view: View) -> QuestionPicture:
 
 @functools.lru_cache(maxsize=4096)
 def center_m(block: Block) -> Floats:
-    """Return the middle of the box round a block, shape (3,) [m], world frame."""
+    """Return the middle of the box around a block, shape (3,) [m], world frame."""
     middle: Floats = bounds_m(block).mean(axis=0)
     return middle
 
 
 def height_m(block: Block) -> float:
-    """Return the way from a block's lowest to its highest point [m]."""
+    """Return the height of a block from its lowest to its highest point [m]."""
     low, high = bounds_m(block)[:, 2]
     return float(high - low)
 
@@ -117,7 +117,7 @@ def shares(picture: QuestionPicture) -> Mapping[int, float]:
 
 
 def _plain(picture: QuestionPicture) -> tuple[tuple[Block, ...], View]:
-    """Return blocks, as far as they decide what is hidden, and view."""
+    """Return the blocks, without facts that do not affect what is hidden, and the view."""
     blocks = tuple(replace(block, color="red", depend=()) for block in picture.blocks)
     return blocks, picture.view_deg
 
@@ -132,7 +132,7 @@ def _shares(blocks: tuple[Block, ...], view: View) -> Mapping[int, float]:
 def _extents(
     blocks: tuple[Block, ...], view: View
 ) -> tuple[Mapping[int, float], Mapping[int, tuple[float, float]]]:
-    """Return the share of the picture, and both ends across it (-1 to 1), of blocks by order."""
+    """Return each block's share of the picture and its left and right end (-1 to 1), by order."""
     style = PictureStyle(_SIZE_PX, "checkerboard", *view)
     camera = goal_camera(Scene("", (1,), blocks, ()), style)
     pixels = shoot(blocks, camera, _SIZE_PX).block
@@ -144,21 +144,21 @@ def _extents(
 
 
 def seen_blocks(picture: QuestionPicture, least: float) -> list[Block]:
-    """Return the blocks that show at least this share of themselves in a picture."""
+    """Return the blocks of which at least this share is visible in a picture."""
     seen_share = shares(picture)
     return [block for block in picture.blocks if seen_share[block.order] >= least]
 
 
 def are_seen(picture: QuestionPicture, orders: Collection[int], least: float) -> bool:
-    """True if each of the named blocks shows at least this share of itself."""
+    """True if at least this share of each of the named blocks is visible."""
     return set(orders) <= set(orders_of(seen_blocks(picture, least)))
 
 
 def require_seen(
     picture: QuestionPicture, least: float, blocks: Sequence[Block] | None = None
 ) -> Sequence[Block]:
-    """Return some blocks, or all. Raises UnfairError that names those that show less than `least`
-    of themselves.
+    """Return the given blocks, by default all. Raises UnfairError that names those of which less
+    than `least` is visible.
     """
     blocks = picture.blocks if blocks is None else blocks
     shown = orders_of(seen_blocks(picture, least))
@@ -172,7 +172,7 @@ Below = Mapping[int, frozenset[int]]
 
 
 def all_below(order: int, below: Below) -> set[int]:
-    """Return the orders of all that a block rests on, directly or not, without the ground."""
+    """Return the orders of all direct and indirect supports of a block, without the ground."""
     found: set[int] = set()
     waiting = [order]
     while waiting:
@@ -183,14 +183,14 @@ def all_below(order: int, below: Below) -> set[int]:
 
 
 def require_supports_seen(picture: QuestionPicture, blocks: Sequence[Block]) -> None:
-    """Raise UnfairError unless all that the blocks rest on shows enough to tell their height."""
+    """Raise UnfairError unless enough of all supports is visible to tell the blocks' heights."""
     below = support_graph(picture.blocks)
     under = {order for block in blocks for order in all_below(block.order, below)}
     require_seen(picture, COUNTED, [block for block in picture.blocks if block.order in under])
 
 
 def require_shapes_seen(picture: QuestionPicture) -> Sequence[Block]:
-    """Return the blocks. Raises UnfairError unless each shows enough to tell its shape."""
+    """Return the blocks. Raises UnfairError unless enough of each is visible to tell its shape."""
     require_seen(picture, _SHAPED)
     if not all(shows_profile(block, picture.view_deg) for block in picture.blocks):
         raise UnfairError("some block is seen from a side that does not tell its shape")
@@ -202,7 +202,7 @@ def require_shapes_seen(picture: QuestionPicture) -> Sequence[Block]:
 
 
 def outermost(blocks: Sequence[Block], picture: QuestionPicture, to_left: bool) -> Block | None:
-    """Return the block that is farthest to a side of a picture, or None when that is close.
+    """Return the block that is farthest to a side of a picture, or None if it is too close to call.
 
     Both its middle and its outer edge have to be clearly farther out than those of the others.
     """
@@ -218,7 +218,7 @@ def outermost(blocks: Sequence[Block], picture: QuestionPicture, to_left: bool) 
 
 
 def shows_profile(block: Block, view: View) -> bool:
-    """True if a view shows the face that tells an arch, a prism or a half cylinder from a box."""
+    """True if a view shows the face that tells a block apart from a box; always for boxes."""
     shape = SHAPES[block.type]
     if shape.is_box:
         return True
@@ -237,7 +237,7 @@ def are_told_apart(pictures: Sequence[QuestionPicture]) -> bool:
 
 
 def same_blocks(one: Sequence[Block], other: Sequence[Block]) -> bool:
-    """True if two sets of blocks look the same, whatever their numbers: up to 2 mm, 2 degrees."""
+    """True if two sets of blocks look the same, up to 2 mm and 2 degrees; orders do not matter."""
 
     def alike(a: Block, b: Block) -> bool:
         start, end = Pose.goal(a), Pose.goal(b)
@@ -254,7 +254,7 @@ def same_blocks(one: Sequence[Block], other: Sequence[Block]) -> bool:
 
 
 def picture_of(question: Question, label: str) -> QuestionPicture:
-    """Return the picture with a label; UnfairError unless there is exactly one."""
+    """Return the picture with a label. Raises UnfairError unless there is exactly one."""
     found = [picture for picture in question.pictures if picture.label == label]
     if len(found) != 1:
         raise UnfairError(f"has {len(found)} pictures labeled {label}")
@@ -267,7 +267,7 @@ def option_pictures(question: Question) -> list[QuestionPicture]:
 
 
 def marked_order(picture: QuestionPicture, letter: str) -> int:
-    """Return the order of the block that shows at a mark; UnfairError when there is none."""
+    """Return the order of the block visible at a mark. Raises UnfairError if there is none."""
     shot = seen(replace(picture, marks=()))
     for mark in picture.marks:
         order = seen_order(picture, shot, mark.position_m)
@@ -287,9 +287,9 @@ def with_lot(
 def highlighted(
     picture: QuestionPicture, blocks: Sequence[Block], slots: Slots, taken: int | None = None
 ) -> frozenset[int]:
-    """Return orders of the blocks of the slots' `color`; all others are of their `other` color.
+    """Return orders of the blocks in the slots' `color`; all others are in their `other` color.
 
-    The block that is `taken` is of a color of its own. UnfairError when a picture shows another
+    The block that is `taken` has its own color. Raises UnfairError if a picture shows another
     structure or other colors.
     """
     color_of = {block.order: block.color for block in picture.blocks}
@@ -307,7 +307,7 @@ def highlighted(
 
 Feature = Literal["color", "type", "layer", "side", "support"]
 _ORDER = ("cube", "rectangular prism", "triangular prism", "half cylinder", "cylinder", "arch")
-"""The paper's six words (appendix A.4); those of further shapes come behind."""
+"""The paper's six words (appendix A.4); those of further shapes follow them."""
 SHAPE_WORDS: dict[str, tuple[BlockType, ...]] = {
     word: tuple(one for one, shape in SHAPES.items() if shape.word == word)
     for word in dict.fromkeys((*_ORDER, *(shape.word for shape in SHAPES.values())))
@@ -331,12 +331,12 @@ def shape_word(block_type: BlockType) -> str:
 
 
 def resolve(text: str, picture: QuestionPicture, loosely: bool = False) -> tuple[int, ...]:
-    """Return the orders of the blocks that an expression fits, of those that are in the picture.
+    """Return the orders of the blocks in the picture that an expression fits.
 
-    None when what it says is too close to call: two blocks about as far to the left, or two
-    blocks of that color and type in one layer. `loosely` is how someone reads who takes cubes for
-    short rectangular prisms, half cylinders for cylinders, and the other way round. Raises
-    UnfairError for words that are no expression.
+    Empty if it is too close to call: two blocks about equally far to the left, or two blocks of
+    that color and type in one layer. If it is read `loosely`, as by someone who mistakes cubes for
+    short rectangular prisms, half cylinders for cylinders, or vice versa, look-alikes fit as well.
+    Raises UnfairError for words that are no expression.
     """
     match = _PATTERN.fullmatch(text.removeprefix("the "))
     if match is None:
@@ -350,7 +350,7 @@ def resolve(text: str, picture: QuestionPicture, loosely: bool = False) -> tuple
             return block.type in types
         if shows_profile(block, picture.view_deg):
             return block.type in alike
-        # Seen from this side, it may be taken for anything but what it is.
+        # Seen from this side, it may be mistaken for any other type.
         return block.type not in types
 
     fitting = [b for b in picture.blocks if color in (None, b.color) and is_called(b)]
@@ -373,7 +373,7 @@ def resolve(text: str, picture: QuestionPicture, loosely: bool = False) -> tuple
 
 
 def resolve_one(text: str, picture: QuestionPicture) -> Block:
-    """Return the one block that an expression fits, even loosely; UnfairError otherwise."""
+    """Return the only block that an expression fits, even loosely. Raises UnfairError if not."""
     orders = resolve(text, picture)
     if len(orders) != 1:
         raise UnfairError(f"{text!r} fits {len(orders)} blocks")
@@ -385,8 +385,8 @@ def resolve_one(text: str, picture: QuestionPicture) -> Block:
 def resolve_seen(
     texts: Sequence[str], picture: QuestionPicture, least: float = NAMED
 ) -> list[Block]:
-    """Return the blocks that expressions fit, each of which shows so much of itself; UnfairError
-    otherwise.
+    """Return the blocks that expressions fit. Raises UnfairError unless at least this share of
+    each is visible.
     """
     blocks = [resolve_one(text, picture) for text in texts]
     require_seen(picture, least, blocks)
@@ -394,8 +394,8 @@ def resolve_seen(
 
 
 def names(block: Block, picture: QuestionPicture, features: Sequence[Feature]) -> tuple[str, ...]:
-    """Return expressions that fit this block alone and speak of these features only, shortest
-    first; none that says more than another.
+    """Return expressions that fit only this block and use only these features, shortest first;
+    none that merely adds to another.
     """
     true = {"color": block.color, "type": shape_word(block.type)}
     known = {name: word for name, word in true.items() if name in features}
@@ -424,12 +424,12 @@ def names(block: Block, picture: QuestionPicture, features: Sequence[Feature]) -
 def drawn_name(
     rng: np.random.Generator, block: Block, picture: QuestionPicture, features: Sequence[Feature]
 ) -> str | None:
-    """Return one of the shortest expressions that fit a block alone, or None."""
+    """Return one of the shortest expressions that fit only this block, or None."""
     expressions = names(block, picture, features)
     return pick(rng, expressions[:_NAMES_DRAWN_FROM]) if expressions else None
 
 
 def plain_names(picture: QuestionPicture) -> Mapping[int, str]:
-    """Return the shortest name by color and type of each block that shows enough, by order."""
+    """Return the shortest name by color and type of each sufficiently visible block, by order."""
     found = ((b.order, names(b, picture, ("color", "type"))) for b in seen_blocks(picture, NAMED))
     return {order: expressions[0] for order, expressions in found if expressions}

@@ -1,14 +1,14 @@
 """VP, OR: one structure seen from elsewhere, or its subassemblies in the order of building.
 
-VP: the four options show one structure from one view in four colorings, of which the first picture
-shows one from elsewhere; any of the four may be the one, it is drawn. Blocks exchange their colors
-with others at their height only. So all outlines are equal, each color shows at the same heights,
-options alone tell nothing, and whoever compares how much of each color shows finds one in four.
+VP: the four options show one structure from one view in four colorings; the first picture shows one
+of these, each equally likely, from another view. Colors are only exchanged between blocks at the
+same height. So all outlines are equal, each color appears at the same heights, options alone reveal
+nothing, and a reader who compares the visible shares of colors finds one answer in four.
 
-OR: every picture shows the whole structure, so that nothing in it is larger or smaller for being
-early: the blocks of one stage have one color, all the others another. A block of each stage rests
-on one of the stage before, so that there is one order, and the stages of a structure with several
-towers are no layers: no sorting by size, height or place in the picture gives the order.
+OR: every picture shows the whole structure, so that sizes do not depend on the stage: the
+blocks of one stage have one color, all others another. A block of each stage rests on one of the
+stage before, so that there is only one order. Stages follow towers rather than layers: sorting by
+size, height or place in the picture does not give the order.
 """
 
 from __future__ import annotations
@@ -30,17 +30,17 @@ from phyblock.sim.question_pictures import is_inside, seen, shown_pixels
 # VP
 
 _FRONTS_DEG = (0.0, 90.0, 180.0, 270.0)
-"""Straight on: a mirror image of a slanted view can be a true view of the same side."""
+"""Straight views only: a mirror image of a slanted one can be a true view of the same side."""
 _FRONT_ELEVATION_DEG = 22.0
 _SIDES: dict[str, float] = base.WORDS["sides_seen"]
 _LEAST_TURN_DEG, _FAMILIES_TRIED = 60, 40
 _LEAST_SHARE = 0.12
-"""In so much of what shows of the blocks any two options differ: less is easily overlooked."""
+"""Minimum share of the visible blocks in which two options differ: less is easily overlooked."""
 _LEVEL_M = 0.01
 
 
 class ViewpointMaker(Maker):
-    """Kinds: `vp-match`, a structure from anywhere; `vp-side`, what is seen from a side named."""
+    """Kinds: `vp-match`, a structure from any side; `vp-side`, from the side that is named."""
 
     subtask: Subtask = "VP"
     spare = 2.0
@@ -56,7 +56,7 @@ class ViewpointMaker(Maker):
         yield from _colorings(scene, rng, "vp-side", front, _from_side(front, side), side)
 
     def rederive(self, question: Question) -> tuple[int, ...]:
-        """Compare the blocks in the pictures, whichever side they are seen from."""
+        """Compare the blocks in the pictures, from any side."""
         slots = base.slots_of(question)
         shown, options = sight.picture_of(question, "scene"), sight.option_pictures(question)
         if question.wording == "vp-side":
@@ -100,7 +100,7 @@ def _colorings(
 
 
 def _exchanged(blocks: Sequence[Block], rng: np.random.Generator) -> tuple[Block, ...]:
-    """Return the blocks, those at each height with one another's colors."""
+    """Return the blocks with colors shuffled among those at each height."""
     colors: dict[int, Color] = {}
     for level in {round(block.position_m[2] / _LEVEL_M) for block in blocks}:
         same = [block for block in blocks if round(block.position_m[2] / _LEVEL_M) == level]
@@ -110,7 +110,7 @@ def _exchanged(blocks: Sequence[Block], rng: np.random.Generator) -> tuple[Block
 
 
 def _unlike(four: Sequence[Sequence[Block]], pixels: dict[int, int]) -> float:
-    """Return the least share of what shows of the blocks in which two colorings differ."""
+    """Return the smallest share of the visible blocks in which two colorings differ."""
     differing = (
         sum(pixels[a.order] for a, b in zip(one, other, strict=True) if a.color != b.color)
         for one, other in itertools.combinations(four, 2)
@@ -119,8 +119,8 @@ def _unlike(four: Sequence[Sequence[Block]], pixels: dict[int, int]) -> float:
 
 
 def _hits(four: Sequence[Sequence[Block]], first: dict[int, int], second: dict[int, int]) -> float:
-    """Return how many colorings are found by the nearest shares of colors in what shows of the
-    blocks, rounded to a thousandth; ties count in part.
+    """Return the number of colorings that the closest visible shares of colors find, rounded to a
+    thousandth; ties count in part.
     """
 
     def shares(pixels: dict[int, int]) -> Floats:
@@ -140,9 +140,9 @@ def _hits(four: Sequence[Sequence[Block]], first: dict[int, int], second: dict[i
 _LEAST_BLOCKS, _VIEWS_TRIED, _CUTS_TRIED = 6, 4, 400
 _GO_ON = 0.75
 _MOST_SORTED, _MOST_RISING = 4, 2
-"""So many more of the six pairs of stages, at the most, rise in some measure, or in height."""
+"""Maximum surplus of rising or falling pairs, of six, in a measure and in mean height."""
 _PAIRS = tuple(itertools.permutations(sight.PLAIN_COLORS, 2))
-"""The color of a stage and that of all else."""
+"""The color of a stage and that of all other blocks."""
 Stages = Sequence[frozenset[int]]
 
 
@@ -189,7 +189,7 @@ class OrderingMaker(Maker):
 
 
 def _cut(scene: Scene, rng: np.random.Generator) -> Stages:
-    """Return a random order of building, tower by tower rather than by layers, cut in four."""
+    """Return a random building order, by towers rather than layers, cut into four stages."""
     order: list[int] = []
     while len(order) < len(scene):
         ready = scene.graph.ready(sum(1 << vertex for vertex in order))
@@ -203,7 +203,7 @@ def _cut(scene: Scene, rng: np.random.Generator) -> Stages:
 
 
 def _only_order(scene: Scene, stages: Stages) -> tuple[int, ...] | None:
-    """Return places of the stages in the one order in which they can follow, or None."""
+    """Return the places of the stages in their only possible order, or None."""
     stage_of = {order: place for place, stage in enumerate(stages) for order in stage}
     before = {
         (stage_of[below], stage_of[block.order])
@@ -220,7 +220,7 @@ def _only_order(scene: Scene, stages: Stages) -> tuple[int, ...] | None:
 
 
 def _is_sorted_by_eye(plain: QuestionPicture, stages: Stages) -> bool:
-    """True if size, height or place of what is highlighted tells much of the order, either way."""
+    """True if size, height or place of highlighted blocks reveals much of the order, either way."""
     shown, looks = seen(plain).block, []
     for stage in stages:
         blocks = [(i, b.position_m[2]) for i, b in enumerate(plain.blocks) if b.order in stage]

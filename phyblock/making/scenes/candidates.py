@@ -1,8 +1,8 @@
-"""Candidate sets: the needed blocks among distractors that other goals need as often.
+"""Candidate sets: the needed blocks, and distractors that other goals need as often.
 
-Whether a candidate is needed shall not show in what it is, in which pose, in how many poses its
-kind is offered, or in where it stands. So a distractor is drawn as often as makes every look
-needed in the same share of the sets that offer it.
+Nothing may reveal whether a candidate is needed: neither its look, nor the number of poses in which
+its kind is offered, nor its place in the list. So distractors are drawn at rates that make every
+look needed in the same share of the sets that offer it.
 """
 
 from __future__ import annotations
@@ -19,26 +19,26 @@ from phyblock.making.scenes.sketch import POSES
 from phyblock.text import drawn_bytes
 
 NEEDED: dict[BlockType, dict[str, float]] = read_own_yaml(Path(__file__).with_name("needed.yaml"))
-"""Looks of a type and pose that a goal of the grammar needs on average, over its colors:
-counted in 1,200 goals. Poses that no goal needs give themselves away and are not offered.
+"""Mean number of looks of a type and pose, over all its colors, that a goal of the grammar needs,
+counted in 1,200 goals. Poses that no goal needs would give themselves away and are not offered.
 """
 _EVEN_SHARE = 0.36
-"""A look is to be needed in this share of the sets that offer it: 5.76 of 16 on average."""
+"""Share of the sets that offer a look in which it is needed: 5.76 of 16 on average."""
 _RISING: tuple[tuple[BlockType, ...], ...] = (
     *(("arch",), ("cylinder",), ("cuboid2",), ("cuboid3",), ("cube",), ("cuboid1",)),
     ("triangle", "semi_cylinder"),
 )
-"""From the types that goals have low to those that they have high: whoever names all candidates as
-they are listed names them in a good order to build in, and wins nothing by finding a better one.
+"""Types from those low in goals to those high in them. So naming all candidates as listed is
+already a good building order, and a reader gains nothing by finding a better one.
 """
 _TIERS = {block_type: tier for tier, types in enumerate(_RISING) for block_type in types}
 _RARER: dict[BlockType, float] = {"triangle": 0.7}
-"""Factors on how often a type is drawn as a distractor. Triangles are of one color in six poses: to
-setting B, where a pose does not count, all of them are one block offered again and again, and
+"""Factors on how often a type is drawn as a distractor. Triangles have one color and six poses: in
+setting B, where poses do not count, all of them are the same block offered repeatedly, and
 leaving some out would pay.
 """
 _MOST_DRAWN = 0.98
-"""The most: looks that more than `_EVEN_SHARE` of all goals need are offered nearly always."""
+"""Upper limit: looks that more than `_EVEN_SHARE` of all goals need are nearly always offered."""
 
 
 def make_candidates(
@@ -46,9 +46,9 @@ def make_candidates(
 ) -> CandidateSet:
     """Return up to `MAX_CANDIDATES` candidates that look different, with all that a scene needs.
 
-    Distractors come from `palette`. Types that goals have low stand first, candidates of one type
-    in an order that is drawn. The same scene id and seed give the same set everywhere. Raises
-    DataError when the scene needs more looks than that.
+    Distractors come from `palette`. Types that are low in goals are listed first, the rest of the
+    order is random. The same scene id and seed give the same set everywhere. Raises DataError if
+    the scene needs more looks than that.
     """
     needed: dict[Look, Candidate] = {}
     for block in scene.blocks:
@@ -72,8 +72,8 @@ def make_candidates(
 
 
 def _rates(palette: tuple[Kind, ...]) -> dict[Candidate, float]:
-    """Rate at which each look that some goal needs is drawn as a distractor, over one unit of
-    time: one is drawn within it where it is not needed as often as its even share asks.
+    """Return the rate per unit of time at which each look that some goal needs is drawn as a
+    distractor: the probability of being drawn within one unit gives the look its even share.
     """
     colors = Counter(block_type for block_type, _ in palette)
     rates = {}
@@ -88,6 +88,6 @@ def _rates(palette: tuple[Kind, ...]) -> dict[Candidate, float]:
 
 
 def _drawn(candidate: Candidate, salt: str) -> float:
-    """A number in (0, 1) by a hash: the same on every platform and Python."""
+    """Return a number in (0, 1) from a hash: the same on every platform and Python."""
     digest = drawn_bytes(f"{salt}/{candidate}")
     return (int.from_bytes(digest[:6], "big") + 0.5) / 2**48

@@ -40,7 +40,7 @@ _ALLOWED = f"a file of scenes ({', '.join(_SUFFIXES)}), or a folder of such file
 
 
 class GivenBlock(Line, extra="forbid"):
-    """A block at its goal pose; `layer` and `depend` may be there and are derived all the same."""
+    """A block at its goal pose; `layer` and `depend` may be given, but are derived anyway."""
 
     type: ShapeName
     color: Color
@@ -52,7 +52,7 @@ class GivenBlock(Line, extra="forbid"):
 
 
 class GivenScene(Line, extra="forbid"):
-    """A goal structure; what is left out is derived."""
+    """A goal structure; omitted fields are derived."""
 
     blocks: Annotated[tuple[GivenBlock, ...], Field(min_length=1, max_length=MAX_BLOCKS)]
     id: Name | None = None
@@ -64,7 +64,7 @@ class GivenScene(Line, extra="forbid"):
 
 @dataclass(frozen=True)
 class ReadScene:
-    """A scene that was read, and where it stands."""
+    """A scene that was read, with its name and its place in a file."""
 
     name: str
     given: GivenScene
@@ -73,8 +73,8 @@ class ReadScene:
 
 @dataclass(frozen=True)
 class Completed:
-    """A scene with all that was derived; `offered` are candidates that were given, and `notes` tell
-    what is unusual about it.
+    """A scene with all that was derived; `offered` are the candidates if they were given, and
+    `notes` describe anything unusual about it.
     """
 
     scene: Scene
@@ -83,7 +83,7 @@ class Completed:
 
 
 def completed(read: ReadScene) -> Completed | tuple[Problem, ...]:
-    """Return a scene as `complete` does, or what is wrong with it."""
+    """Return a scene as `complete` does, or its problems."""
     try:
         return complete(read)
     except DataError as error:
@@ -93,14 +93,14 @@ def completed(read: ReadScene) -> Completed | tuple[Problem, ...]:
 def complete(read: ReadScene) -> Completed:
     """Derive a scene, and check that it can be built and stands.
 
-    Raises DataError with what is wrong: blocks that overlap, float or fall, contacts without an
-    order, candidates that lack what is needed.
+    Raises DataError with its problems: blocks that overlap, float or fall, contacts that allow no
+    order, candidates that lack a needed look.
     """
     given = read.given
     scene = derived(read.name, given, read.where)
     offered = None if given.candidates is None else candidate_set(given.candidates)
     facts = SceneFacts(scene, offered)
-    # What overlaps or floats falls as well; that is reported once.
+    # Blocks that overlap or float fall as well: only the cause is reported.
     found = [*findings_of(facts, ("overlap", "floating", "order", "candidates"))]
     found = found or [*findings_of(facts, ("unstable step", "unstable"))]
     hint = "order blocks so that each can be placed, and stands, after those before it"
@@ -120,10 +120,10 @@ def complete(read: ReadScene) -> Completed:
 
 
 def derived(name: str, given: GivenScene, where: str) -> Scene:
-    """Return the scene that the poses of blocks make; nothing but its order is checked.
+    """Return the scene that blocks form at their poses; only their order is checked.
 
-    Where no block says its `order`, blocks are numbered as they are listed, each behind those that
-    it rests on. Raises DataError where contacts name no order.
+    If no block has an `order`, blocks are numbered as they are listed, each after those that it
+    rests on. Raises DataError if contacts allow no order.
     """
     orders = [block.order for block in given.blocks if block.order is not None]
     if orders and (len(orders) < len(given.blocks) or len(set(orders)) < len(orders)):
@@ -150,15 +150,15 @@ def derived(name: str, given: GivenScene, where: str) -> Scene:
 
 
 def palette_of(scenes: Sequence[Scene]) -> Palette:
-    """Return the palette for distractors: the kit's, where the scenes keep to it."""
+    """Return the palette for distractors: the kit's, if it has all blocks of the scenes."""
     kinds = {block.kind for scene in scenes for block in scene.blocks}
     return "kit" if kinds <= set(KIT_PALETTE) else "full"
 
 
 def read_given(path: Path) -> tuple[ReadScene, ...]:
-    """All scenes of a file or folder, by name; DataError with everything that is wrong.
+    """Return all scenes of a file or folder, by name. Raises DataError with all problems.
 
-    A scene without an `id` is called as its file, with its number where that holds several.
+    A scene without an `id` is named after its file, with its number if the file holds a list.
     """
     scenes: dict[str, ReadScene] = {}
     problems: list[Problem] = []
@@ -168,7 +168,7 @@ def read_given(path: Path) -> tuple[ReadScene, ...]:
             for given, called, where in _read(file):
                 name = given.id or called
                 if given.id is None and not re.fullmatch(NAME, name):
-                    message, hint = "has no id, and cannot be called as its file", "give it an id"
+                    message, hint = "has no id, and cannot be named after its file", "give it an id"
                     raise DataError(Problem(where, message, "id", name, NAME_ALLOWED, hint))
                 if earlier := scenes.get(name):
                     message = f"is used by {earlier.where} already"
@@ -185,7 +185,7 @@ def read_given(path: Path) -> tuple[ReadScene, ...]:
 
 
 def _read(file: Path) -> Iterator[tuple[GivenScene, str, str]]:
-    """Yield each scene of a file, a name by the file, and where it stands."""
+    """Yield each scene of a file, a name made from the file's, and its place in it."""
     if file.suffix == ".jsonl":
         adapter = TypeAdapter(GivenScene)
         for number, line in enumerate(read_data(file, _ALLOWED).splitlines(), 1):

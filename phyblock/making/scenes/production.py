@@ -1,4 +1,4 @@
-"""Base scenes and their variations, each from a seed of its own.
+"""Base scenes and their variations, each from its own seed.
 
 A scene is a pure function of its request: a seed, a group, a number, and for a variation the
 requests of the scenes it is made from. So any process can draw any scene, in any order.
@@ -41,7 +41,7 @@ from phyblock.workers import Workers
 
 
 class Group(NamedTuple):
-    """What is asked of the scenes of a group, and what they are made from (`groups.yaml`)."""
+    """Requirements on the scenes of a group, and the sources of variations (`groups.yaml`)."""
 
     levels: tuple[int, ...]
     least: int
@@ -57,7 +57,7 @@ GROUPS: dict[str, Group] = {
 }
 _TRIES = 25
 _KEPT = 2048
-"""Base scenes that are remembered, as many variations are drawn from each."""
+"""Number of cached base scenes; many variations are made from each."""
 _MAX_LOOKS = 14
 
 
@@ -72,17 +72,17 @@ class Request:
     parents: tuple[Request, ...] = ()
 
     def rng(self) -> np.random.Generator:
-        """A random source of this request's own."""
+        """Return the random source of this request."""
         kind = "variation" if self.parents else "base"
         text = f"{self.seed}/{self.palette}/{self.group}/{kind}/{self.number}"
         return np.random.default_rng(int.from_bytes(drawn_bytes(text)[:16], "big"))
 
 
 def draw(request: Request) -> Scene | None:
-    """The scene of a request, named after its theme; None when the rules gave none that fits.
+    """Return the scene of a request, or None if the rules gave none that fits.
 
-    A name is `THEME`, or `recolored` or `combined` for a variation. Its `parents` are empty: the
-    names of scenes are given when they are accepted.
+    Its name is its theme, or `recolored` or `combined` for a variation. Accepted scenes get their
+    own names and their parents later.
     """
     if not request.parents:
         return _drawn_base(request)
@@ -96,7 +96,7 @@ def draw(request: Request) -> Scene | None:
     if len(parts) > 1:
         gap, axis = (1.0, 1.0, 2.0)[int(rng.integers(3))], (1, 1, 0)[int(rng.integers(3))]
         return _fitting("combined", request.group, beside(parts, gap, axis))
-    # Blocks of one type and color stay of one color, another one where the palette has one.
+    # Blocks of one type and color keep one color in common, a new one if the palette has one.
     taken: dict[Kind, Kind] = {}
     for kind in dict.fromkeys(block.kind for block in parts[0]):
         kinds = [(kind[0], color) for color in COLORS if color != kind[1]]
@@ -116,13 +116,13 @@ def _drawn_base(request: Request) -> Scene | None:
         draft.follow(name)
         scene = _fitting(name, request.group, draft.blocks)
         if scene is not None:
-            # A block let down along the face of another may catch on its edge and hang there.
+            # A block lowered along the face of another may catch on its edge and float there.
             return None if find_gaps(scene.blocks) else scene
     return None
 
 
 def _fitting(name: str, group: str, blocks: list[Block]) -> Scene | None:
-    """Return the scene of blocks, if it keeps the limits of a group."""
+    """Return the scene of blocks if it is within the limits of a group, or None."""
     levels = tuple(GROUPS[group].levels)
     limits = [LEVEL_LIMITS[level] for level in levels]
     if not GROUPS[group].least <= len(blocks) <= min(limit.most_blocks for limit in limits):
@@ -137,12 +137,12 @@ def _fitting(name: str, group: str, blocks: list[Block]) -> Scene | None:
 
 
 _PATIENCE = 150
-"""So many candidates running that are refused or known end the search."""
+"""Number of candidates in a row, all refused or known, after which the search ends."""
 _LARGEST_ROUND = 256
 
 
 class Share(NamedTuple):
-    """The scenes of a group that are wanted: drawn by the grammar, and made from those."""
+    """The wanted scenes of a group: numbers of base scenes and of variations."""
 
     group: str
     base: int
@@ -150,9 +150,9 @@ class Share(NamedTuple):
 
 
 def shares(count: int, levels: Sequence[int] = (1, 2, 3, 4)) -> tuple[Share, ...]:
-    """The shares of `count` scenes, in the proportions of the built-in 400, in these levels.
+    """Return the shares of `count` scenes of these levels, in the proportions of the built-in 400.
 
-    Scenes of levels 1 and 2 are asked for when both levels are. Largest remainders decide.
+    Scenes that count in levels 1 and 2 are included if both are. Rounded by largest remainders.
     """
     wanted = {
         (name, part): (group.base, group.varied)[part]
@@ -172,13 +172,13 @@ def shares(count: int, levels: Sequence[int] = (1, 2, 3, 4)) -> tuple[Share, ...
 
 @functools.cache
 def builtin_forms() -> frozenset[bytes]:
-    """Colorless forms of the built-in set, which no generated scene may have."""
+    """Return the colorless forms of the built-in set, which no generated scene may have."""
     tasks = read_builtin(bundled("benchmarks", "data", "phyblock-400")).tasks
     return frozenset(colorless(task.scene.blocks) for task in tasks)
 
 
 class Drawn(NamedTuple):
-    """A scene that was drawn, with what it is recognized by, with and without its colors."""
+    """A scene that was drawn, with its fingerprints with and without colors."""
 
     request: Request
     scene: Scene
@@ -194,11 +194,11 @@ def _drawn(request: Request) -> Drawn | None:
 
 
 class Production:
-    """Scenes of a seed; it remembers 16 bytes a candidate, and a request a base scene.
+    """Produces the scenes of a seed; it keeps 16 bytes per candidate and a request per base scene.
 
-    The same arguments give the same scenes with any workers: a candidate depends on its number
-    alone, and of two that are alike the lower number is kept. What has a form of `excluded` in
-    any colors is `rejected`, and counted.
+    The same arguments give the same scenes with any workers: a candidate depends only on its
+    number, and of two equal ones the lower number is kept. `rejected` counts candidates with a
+    form of `excluded`, in any colors.
     """
 
     def __init__(
@@ -219,7 +219,7 @@ class Production:
     def scenes(self, wanted: Sequence[Share]) -> Iterator[Scene]:
         """Yield accepted scenes: first all base scenes, group by group, then the variations.
 
-        Raises DataError when the rules give no more different scenes.
+        Raises DataError if the rules give no more different scenes.
         """
         self._width = max(3, len(str(sum(share.base + share.varied for share in wanted))))
         for share in wanted:
@@ -228,7 +228,7 @@ class Production:
             yield from self.variations(share.group, share.varied)
 
     def bases(self, group: str, wanted: int) -> Iterator[Scene]:
-        """Scenes that the grammar draws."""
+        """Yield scenes that the grammar draws."""
         taken = 0
         request = partial(Request, self._seed, self._palette, group)
         for made, scene in self._accepted(wanted, request, self._next[group]):
@@ -242,7 +242,7 @@ class Production:
             raise DataError(Problem(f"level {group}", message, hint=hint))
 
     def variations(self, group: str, wanted: int) -> Iterator[Scene]:
-        """Variations, and base scenes for what is missing where there are too few to vary."""
+        """Yield variations, then base scenes for those missing if there are too few to vary."""
         sources = []
         for count, groups in GROUPS[group].sources:
             bases = [base for one in groups for base in self._bases if base.group == one]
@@ -266,7 +266,7 @@ class Production:
     def _accepted(
         self, wanted: int, request: Callable[[int], Request], first: int
     ) -> Iterator[tuple[Request, Scene]]:
-        """The first `wanted` candidates that are sound and new, in the order of their numbers."""
+        """Yield the first `wanted` sound and new candidates, in the order of their numbers."""
         number, taken, last = first, 0, first
         is_sound = partial(is_acceptable, palette=PALETTES[self._palette])
         while taken < wanted and number - last <= _PATIENCE:
@@ -295,9 +295,9 @@ class Production:
 
 
 Split = Literal["train", "dev"]
-"""Scenes without end that share no form with one another's or with the built-in test set."""
+"""Endless series of scenes that share no form with each other or the built-in test set."""
 _DEV_BELOW = 26
-"""Forms whose first byte is below this are of `dev`: a tenth of all."""
+"""Forms whose first byte is below this belong to `dev`: a tenth of all."""
 _LONGEST_SEARCH = 2000
 
 
@@ -311,11 +311,11 @@ def split_tasks(
     first: int = 0,
     step: int = 1,
 ) -> Iterator[AssemblyTask]:
-    """Yield scenes with their candidates, without end, in the proportions of the built-in set.
+    """Yield an endless series of scenes with candidates, in the proportions of the built-in set.
 
-    Each depends on its number alone; `first` and `step` take every so many-th. Scenes are named
-    after what they are, so that one which comes again has the same name. Raises DataError where
-    the rules give no scene that is not `excluded`.
+    Each depends only on its number; only every `step`-th is drawn, from number `first`. Scenes are
+    named by their content, so that one that recurs has the same name. Raises DataError if the
+    rules give no scene that is not `excluded`.
     """
     barred = builtin_forms() | excluded
     parts = [(share, part) for share in shares(10_000, levels) for part in (0, 1)]

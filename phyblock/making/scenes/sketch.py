@@ -1,8 +1,8 @@
 """A sketch pad for structures: put blocks down one after another, as a person builds.
 
-A block is let down from above at a place on the grid, in a pose by its name, and its height follows
-from what it lands on; so a design holds no heights, no overlap and no gap. Rules that draw whole
-structures are in `rules.yaml`.
+A block is lowered from above at a place on the grid, in a named pose, and its height follows from
+what it lands on; so designs give no heights, and have no overlaps and no gaps. Rules that draw
+whole structures are in `rules.yaml`.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ from phyblock.sim.geometry import corners_m
 POSES: Mapping[BlockType, Mapping[str, Euler]] = {
     block_type: shape.poses for block_type, shape in SHAPES.items()
 }
-"""Euler angles [degrees] of each named pose; the first is the one a design means by default."""
+"""Euler angles [degrees] of each named pose; the first is the default of designs."""
 
 
 def transformed(blocks: Sequence[Block], symmetry: Symmetry) -> tuple[Block, ...]:
-    """The blocks turned or mirrored about the origin; their graph stays what it was."""
+    """Return the blocks turned or mirrored about the origin; their graph does not change."""
     return tuple(
         replace(
             block,
@@ -43,13 +43,13 @@ def transformed(blocks: Sequence[Block], symmetry: Symmetry) -> tuple[Block, ...
 
 
 def colorless(blocks: Iterable[Block]) -> bytes:
-    """Return the fingerprint that structures share which are equal but for their colors."""
+    """Return a fingerprint that structures share if they differ only in colors."""
     return fingerprint([replace(block, color=COLORS[0]) for block in blocks])
 
 
 @functools.cache
 def _turned(block_type: BlockType, euler_deg: Euler, symmetry: Symmetry) -> Euler:
-    """Angles of the image of a pose, as `POSES` names them where it does."""
+    """Return the angles of the image of a pose, as in `POSES` if that has the pose."""
     angles = image_deg(euler_deg, symmetry)
     wanted = pose_class(block_type, angles)
     for known in POSES[block_type].values():
@@ -64,7 +64,7 @@ _ABOVE_M = 1.0
 
 
 def make_scene(name: str, levels: tuple[int, ...], blocks: list[Block]) -> Scene:
-    """Return the scene that blocks make, the middle of its ground plan moved to the origin.
+    """Return the scene that blocks form, with the middle of its ground plan at the origin.
 
     Raises CycleError as `scene_of`.
     """
@@ -80,8 +80,8 @@ def make_scene(name: str, levels: tuple[int, ...], blocks: list[Block]) -> Scene
 def scene_of(
     name: str, levels: tuple[int, ...], blocks: Sequence[Block], parents: tuple[str, ...] = ()
 ) -> Scene:
-    """The scene that blocks make where they are: dependencies from contact, layers from the longest
-    path. Raises CycleError when contacts name no order.
+    """Return the scene that blocks form where they are: dependencies from contact, layers from the
+    longest path. Raises CycleError if contacts allow no order.
     """
     below = support_graph(blocks)
     number = {block.order: index for index, block in enumerate(blocks)}
@@ -95,7 +95,7 @@ def scene_of(
 
 
 Palette = Literal["kit", "full"]
-"""The pairs of type and color of the official kit, or all that there are."""
+"""The official kit's pairs of type and color, or all pairs."""
 PALETTES: dict[Palette, tuple[tuple[BlockType, Color], ...]] = {
     "kit": KIT_PALETTE,
     "full": tuple(product(BLOCK_TYPES, COLORS)),
@@ -107,15 +107,15 @@ Step = str | list[Any] | dict[str, Any]
 
 @functools.cache
 def rules() -> dict[str, Step]:
-    """Return the rules by which structures are drawn, by name."""
+    """Return the rules that draw structures, by name."""
     return cast(dict[str, Step], read_own_yaml(Path(__file__).with_name("rules.yaml")))
 
 
 class Draft:
-    """A structure in the making, with the random source and the colors that its rules draw on.
+    """A structure under construction, with the random source and the colors that its rules use.
 
-    A cube comes in one of two tones of the structure, 0 or 1, so that a storey has one color; any
-    other type has one color a structure, the kit's own with the palette `kit`.
+    A cube has one of two tones of the structure, 0 or 1, so that a storey has one color; any other
+    type has one color per structure, the kit's own with the palette `kit`.
     """
 
     def __init__(self, rng: np.random.Generator, palette: Palette = "kit") -> None:
@@ -129,11 +129,11 @@ class Draft:
             self._colors = {t: COLORS[int(i)] for t, i in zip(BLOCK_TYPES, drawn, strict=True)}
 
     def pick(self, options: Sequence[T]) -> T:
-        """One of the options, all alike."""
+        """Return one of the options, each equally likely."""
         return options[int(self.rng.integers(len(options)))]
 
     def maybe(self, chance: float = 0.5) -> bool:
-        """True in a share `chance` of cases."""
+        """Return True with the probability `chance`."""
         return float(self.rng.random()) < chance
 
     def put(
@@ -144,9 +144,9 @@ class Draft:
         pose: str = "",
         color: Color | None = None,
     ) -> None:
-        """Let a block down with the center of its outline at (x, y) [grid units].
+        """Lower a block with the center of its outline at (x, y) [grid units].
 
-        `pose` is a name from `POSES`, by default the first; `color` by default the kit's.
+        `pose` is a name from `POSES`, by default the first; `color` is by default the kit's.
         """
         poses = POSES[block_type]
         euler = poses[pose] if pose else next(iter(poses.values()))
@@ -162,11 +162,11 @@ class Draft:
         self.blocks.append(replace(block, position_m=(landed[0], landed[1], landed[2])))
 
     def build(self, text: str, tone: int = 0) -> None:
-        """Let blocks down one after another, as `2 cube 1; arch:cradle 0,-1; cube +1; top`.
+        """Lower blocks one after another, as in `2 cube 1; arch:cradle 0,-1; cube +1; top`.
 
-        Each is a type with, after a colon, a pose, its place y or y,x [grid units], and how many
-        tones it is above `tone`. A 2 puts one at -y and one at +y, where the poses `ramp` and
-        `round` look away from the middle. `top` is a roof or a dome, drawn, its ridge either way.
+        Each part is a type, with a pose after a colon, a place y or y,x [grid units], and a number
+        of tones above `tone`. A leading 2 puts one at -y and one at +y, where the poses `ramp` and
+        `round` face away from the middle. `top` is a random roof or dome, its ridge either way.
         """
         for part in filter(None, text.split("; ")):
             words = part.split()
@@ -187,7 +187,7 @@ class Draft:
                 self.put(block_type, sign * float(y), float(x or 0), sided, color)  # type: ignore[arg-type]
 
     def follow(self, steps: Step, tone: int = 0) -> None:
-        """Do the steps of a rule of `rules.yaml` one after another, in tones above `tone`."""
+        """Follow the steps of a rule of `rules.yaml` in order, with tones counted from `tone`."""
         for step in steps if isinstance(steps, list) else [steps]:
             if isinstance(step, list):
                 self.follow(self.pick(step), tone)
@@ -219,7 +219,7 @@ _ACROSS = Symmetry(2, mirrored=True)
 
 
 def beside(parts: Sequence[Sequence[Block]], gap_units: float, axis: int = 1) -> list[Block]:
-    """Return the parts in a row with gaps between their outlines [grid units], numbered through.
+    """Return the parts in a row with gaps between their outlines [grid units], numbered from 1.
 
     They stand side by side along x, the depth (`axis` 0), or y, the front (1).
     """
