@@ -1,8 +1,8 @@
-"""Requests in a provider's batches: slower, cheaper if the provider says so, never sent twice.
+"""Requests in a provider's batches: slower, cheaper at some providers, never sent twice.
 
-A request waits in the draft of a batch, which is sent when no more come, or in the newest batch
-that the ledger has it in. If it is not known whether a batch was created, since the command was
-killed or the connection lost meanwhile, the model is stopped until a person has looked it up.
+A request waits in the draft of a batch, which is sent when no more requests arrive, or in the
+newest batch that contains it in the ledger. If the command is killed or the connection lost while a
+batch is created, it may or may not exist: the model is stopped until a person has checked.
 """
 
 from __future__ import annotations
@@ -60,8 +60,8 @@ class BatchFiles:
 class Batch:
     """A batch, from its draft, with `lines` of `size_bytes` to send, to its answers by request.
 
-    `most_usd` are its requests by their keys in the reply cache, with the most that each can cost
-    [US dollars], None if no price is known; `held` are their reservations in the budget, `unheld`
+    `most_usd` holds, by the keys of its requests in the reply cache, the maximum cost of each [US
+    dollars], None if no price is known; `held` are their reservations in the budget, `unheld` the
     requests of an earlier command that have none yet. `token` is phyblock's name for it, `id` the
     provider's. `work` ends when its answers have arrived, or it is lost.
     """
@@ -83,11 +83,11 @@ class Batch:
 
     @property
     def shown(self) -> str:
-        """Its name for people."""
+        """The name that is shown to users."""
         return self.id or self.token
 
     def take(self, line: BatchLine) -> None:
-        """Update it by a line of the ledger."""
+        """Update the batch from a line of the ledger."""
         if line.event == "intended":
             costs = line.most_usd or [None] * len(line.keys)
             self.most_usd = dict(zip(line.keys, costs, strict=True))
@@ -111,10 +111,10 @@ def under_way(lines: Iterable[BatchLine], model: str) -> list[Batch]:
 
 @dataclass(eq=False, kw_only=True)
 class BatchModel:
-    """A Model over a provider's batches, which are sent when no request has come for a while.
+    """A Model over a provider's batches, which are sent once no request has arrived for a while.
 
-    `client` makes a client over an HTTP client, which writes requests and reads answers as in
-    direct calls.
+    `client` makes a client from an HTTP client; it writes requests and reads answers as in direct
+    calls.
     """
 
     config: ModelConfig
@@ -142,7 +142,7 @@ class BatchModel:
         self._refusal: UnavailableError | None = None
         for batch in self._batches:
             if batch.event == "intended":
-                self._refusal = self._unsure(batch, "the command ended meanwhile")
+                self._refusal = self._unsure(batch, "the command ended in the meantime")
         self._given: set[str] = set()
 
     async def ask(self, request: Request) -> Reply:
@@ -157,7 +157,7 @@ class BatchModel:
             if self.cache is not None and (kept := self.cache.get(key)) is not None:
                 return kept.model_copy(update={"cost_usd": cost_usd(self.budget.tariff, kept)})
             async with self._adding:
-                # Another sample may have sent the same request meanwhile.
+                # Another sample may have added the same request in the meantime.
                 batch = self._newest.get(key) or await self._add(key, request)
         if key in batch.unheld:
             batch.unheld.discard(key)
@@ -170,9 +170,9 @@ class BatchModel:
             reply = None if batch.answers is None else await self._read(key, request, batch)
         except UnavailableError as error:
             self._refusal = self._refusal or error
-            # This command gets no more news of batches in progress: they count as spent.
+            # This command learns nothing more about batches in progress: they count as spent.
             for each in self._batches:
-                # A draft is not sent any more.
+                # A draft is no longer sent.
                 self._settle_all(each, 0.0 if each.event is None else None)
             raise
         except ModelError as error:
@@ -312,7 +312,7 @@ class BatchModel:
         self._say(f"sent batch {batch.shown} of {len(batch.most_usd):,}")
 
     def _unsure(self, batch: Batch, why: str) -> UnavailableError:
-        """Return the error of a batch that may exist: it needs a person, who looks it up."""
+        """Return the error of a batch that may exist, which a person has to check."""
         known = {"batch": batch.token, "model": self.name, "event": "created", "id": "ID"}
         line = BatchLine.model_validate({**known, "time": batch.created.strftime(_TIME)})
         return UnavailableError(
@@ -352,7 +352,7 @@ class BatchModel:
                 return None
             lines = await self._patiently(partial(self._provider.results, status))
         except ModelError as error:
-            # Errors of its requests are different: these are recorded.
+            # In contrast, errors of its requests are recorded.
             why = f"no answers of batch {batch.shown}, which stays at the provider: {error}"
             raise UnavailableError(why, status=error.status, sent=error.sent) from None
         with writing(path):

@@ -54,7 +54,7 @@ class ModelEvent:
     """An event of a model, or of the whole run ("") to show to the user, with a safe message.
 
     `retry`: a request failed and is sent again after `wait_s`; `notice`: news of a batch, of the
-    cache, or of a server that is not used any more; `stopped`: the model is not available.
+    cache, or of a server that is no longer used; `stopped`: the model is not available.
     """
 
     model: str
@@ -123,19 +123,19 @@ class RetryPolicy:
 
 
 MOST_CONNECTION_FAILURES = 10
-"""Failures in a row after which a server is given up that has never answered, or not for long."""
+"""Minimum number of failures in a row before a server is given up."""
 _STARTING_S = 60.0
-"""Time that a server has to start: one that has never answered is not given up earlier [s]."""
+"""Time in which a server that has never answered may start before it is given up [s]."""
 _GATEWAY = (502, 503, 504)
 _TOO_MUCH = (429, 529)
 
 
 @dataclass(eq=False)
 class Server:
-    """One server with its requests `under_way`, and how often it was chosen.
+    """One server with the number of its requests `under_way`, and of all for which it was `chosen`.
 
-    It failed `failures` times in a row, first at `failing_since_s`, and is not asked before
-    `cool_at_s`, nor while it `is_tried`; `refusal` is the reason why it is not used any more.
+    It failed `failures` times in a row, first at `failing_since_s`, and gets no request before
+    `cool_at_s`, or while it `is_tried`; `refusal` is the reason why it is no longer used.
     """
 
     name: str
@@ -155,9 +155,9 @@ class Servers:
     """Chooses among the servers of a model: the least loaded one that is not cooling down.
 
     A server cools down after two failed or lost connections or gateway errors (502, 503, 504) in a
-    row, longer with each further one, and gets one request at a time until it answers. It also
-    does after a 429 or 529, always for its `Retry-After` at least. A timeout shows nothing: some
-    requests are slow. `report` is called with a sentence on a server that is not used any more.
+    row, longer with each further one, then gets one request at a time until it answers. It also
+    cools down after a 429 or 529, and always at least for the `Retry-After` that is followed. A
+    timeout shows nothing: some requests are slow. `report` gets a sentence if one is given up.
     """
 
     all: tuple[Server, ...]
@@ -172,7 +172,7 @@ class Servers:
         return usable
 
     def cooling_s(self) -> float:
-        """Return the seconds until a server may be asked; raises UnavailableError as `usable`."""
+        """Return the time until a server may be used [s]. Raises UnavailableError as `usable`."""
         return min(map(self._rests_s, self.usable()))
 
     def _rests_s(self, server: Server) -> float:
@@ -182,9 +182,9 @@ class Servers:
 
     @contextlib.contextmanager
     def chosen(self, failed: Server | None = None) -> Iterator[Server]:
-        """Hold a place at the server to ask. One that just `failed` the request is the last choice.
+        """Hold a place at a chosen server. One that just `failed` the request is the last choice.
 
-        It is chosen when the request is admitted, so that a server that is away gets only one.
+        It is chosen when the request is admitted, so that a server that is down gets only one.
         """
         server = min(
             self.usable(), key=lambda s: (self._rests_s(s), s is failed, s.under_way, s.chosen)
@@ -202,14 +202,14 @@ class Servers:
     def failed(self, server: Server, error: ModelError, sent_s: float) -> None:
         """Record that a request sent at `sent_s` failed.
 
-        A server is given up if it refuses every request, or fails many times in a row and has never
-        answered, or not for as long as a request is retried.
+        A server is given up if it refuses every request, or fails many times in a row for as long
+        as a request is retried, at most `_STARTING_S` if it has never answered.
         """
         policy, now_s = self.policy, self.policy.clock.now()
         server.was_heard |= error.status is not None
         is_down = error.sent in ("no", "lost") or error.status in _GATEWAY
         if is_down and sent_s >= server.cool_at_s:
-            # Others that were sent before it failed last show nothing new.
+            # Requests that were sent before its last failure show nothing new.
             server.failing_since_s = server.failing_since_s if server.failures else now_s
             server.failures += 1
         elif not is_down and error.sent == "answered":
@@ -232,10 +232,10 @@ class Servers:
 
 
 class Limits:
-    """The limits of one model: requests in progress, and requests and tokens a minute.
+    """The limits of one model: requests in progress, and requests and tokens per minute.
 
-    Both a minute are kept in the same way: a request that starts delays the next one by its share
-    of a minute. So starts are even, and a request larger than a whole minute's tokens is sent too.
+    Both rates are kept in the same way: a request that starts delays the next one by its share of a
+    minute. So starts are evenly spaced, and a request of more than a minute's tokens is sent, too.
     `overall` is shared by all models of a run.
     """
 
@@ -251,10 +251,10 @@ class Limits:
 
     @contextlib.asynccontextmanager
     async def slot(self, tokens: int = 0, failed: Server | None = None) -> AsyncIterator[Server]:
-        """Hold a place of the model and of the whole run, at the server to ask.
+        """Hold a place of the model and of the whole run, at a chosen server.
 
         Requests are admitted one after another; a model that waits for its turn holds no place that
-        another model could use. `tokens` are the most that the request can take; the server that
+        another model could use. `tokens` is the maximum that the request can use; the server that
         just `failed` it is the last choice.
         """
         async with self._under_way:
@@ -273,7 +273,7 @@ class Limits:
                 self._overall.release()
 
     def release(self, tokens: int) -> None:
-        """Give back tokens that a request turned out not to take."""
+        """Give back tokens that a request did not use after all."""
         self._next_by_tokens_s -= self._token_s * tokens
 
     def _wait_s(self) -> float:
@@ -298,7 +298,7 @@ class _Call:
 
 @dataclass(eq=False, kw_only=True)
 class ChatModel:
-    """Asks a provider, at most as often as needed."""
+    """A model at a provider, which is asked no more often than needed."""
 
     config: ModelConfig
     servers: Servers
@@ -365,7 +365,7 @@ class ChatModel:
                     raise asyncio.CancelledError from None
 
     async def _exchange(self, call: _Call, server: Server, held: Reservation | None) -> Reply:
-        """Write that a call is sent, send it, and write its end.
+        """Record that a call is sent, send it, and record its end.
 
         A failure that may have been billed counts in full; a failure before anything is sent, and
         an internal error, which ends the run, cost nothing.
@@ -394,7 +394,7 @@ class ChatModel:
                 self.limits.release(call.expected.most_tokens)
             self.servers.usable()
             if isinstance(error, UnavailableError):
-                # The server that refuses every request is left out, and another one is asked.
+                # The server that refuses every request is disabled, and another one is used.
                 raise RetryableError(str(error), status=error.status, sent="no") from None
             raise
         except Exception:

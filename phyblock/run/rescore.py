@@ -30,7 +30,7 @@ _CHANGED = "is not the data set that the run was made on, or it was changed sinc
 _MOVED = "name the folder where it is now with --data"
 _STALE = "remove the folder of shards beside the run, and score again"
 _Judged = tuple[Record, Record]
-"""A stored record, and its new judgement."""
+"""A stored record, and the rescored one."""
 _NO_DATA = ("prompt", "pictures", CARRYING, ENGINE)
 """Parts of a track's identity that are not the data that it asks about."""
 
@@ -42,13 +42,13 @@ def rescore(
     watch: Callable[[Iterable[_Judged]], Iterable[_Judged]] = iter,
     workers: Workers | None = None,
 ) -> None:
-    """Judge every stored reply of a run again and replace its records in one step.
+    """Rescore every stored reply of a run and replace its records in one step.
 
     `data` is the new place of the data set, if it has moved. An episode in which today's code would
-    ask something else is kept and no longer final: `report` is called with a sentence on how many
-    there are; `watch` is called with each record. `workers` do the work, if given, and only the
-    first of their shards writes. Raises StoreError for a folder that is not a run or cannot be
-    written, DataError for other data than the run's.
+    ask something else is kept, but is no longer final: `report` gets a sentence on the number of
+    these; `watch` wraps the records as they are rescored. `workers` do the work, if given, and only
+    the first of their shards writes. Raises StoreError if the folder is not a run or cannot be
+    written, DataError if the data are not the run's.
     """
     diverged: Counter[str] = Counter()
     writes = workers is None or workers.shards is None or workers.shards.writes
@@ -87,7 +87,7 @@ def rescore(
 
 
 def judged_again(folder: Path) -> tuple[Manifest, Iterator[Record]]:
-    """Return the manifest of a run and a new record for each line, from its replies and its data.
+    """Return the manifest of a run and a rescored record for each line, from replies and data.
 
     Facts about items, and the numbers of items, come from the data. Nothing is simulated: falls and
     final poses come from the records. Nothing is written. Raises as `rescore`, and StoreError for
@@ -132,7 +132,7 @@ def reopen_tracks(
 ) -> tuple[Track, ...]:
     """Return the tracks of the run in `folder`, without prompts, on the run's `dataset`.
 
-    Raises DataError for other data of a track than the run's.
+    Raises DataError if the data of a track are not the run's.
     """
     path = folder / MANIFEST
     folders: dict[str, Path] = {}
@@ -153,9 +153,9 @@ def reopen_tracks(
 
 
 class _Judge:
-    """Judges records of the run in `folder` again, on tracks that are opened once.
+    """Rescores records of the run in `folder`, on tracks that are opened once.
 
-    With `strict`, an episode that would take another course is a StoreError.
+    With `strict`, an episode that would take another course raises a StoreError.
     """
 
     def __init__(self, folder: Path, data: Path | None = None, *, strict: bool = False) -> None:
@@ -174,7 +174,7 @@ class _Judge:
         self._thread = ThreadPoolExecutor(1)  # The thread of a notebook already has a loop.
 
     def __call__(self, line: tuple[str, Record]) -> _Judged:
-        """Return the record of a line, as stored and judged again."""
+        """Return the record of a line, as stored and rescored."""
         where, record = line
         track = self.tracks.get(record.way.shown.key, {}).get(record.track)
         item = self._items.get((record.track, record.item))
@@ -205,7 +205,7 @@ def _judge_there(folder: Path, data: Path | None, line: tuple[str, Record]) -> _
 async def _again(track: Track, item: Item, record: Record, where: str, *, strict: bool) -> Record:
     given = {**record.as_given(), **about_item(track, item)}
     if "engine" in record.model_fields_set:
-        # Nothing is let go again: what fell stands in the record, and so does what let it fall.
+        # Nothing is simulated again: the record holds what fell, and with which engine.
         given["engine"] = record.as_given()["engine"]
     if not track.plays:
         if record.is_judged:
@@ -235,6 +235,6 @@ async def _again(track: Track, item: Item, record: Record, where: str, *, strict
 
 
 def _decided(turn: AskedTurn) -> dict[str, Any]:
-    """Return the result of a turn, whichever rule parsed its reply."""
+    """Return the result of a turn, without the rule that parsed its reply."""
     fields = set(type(turn).model_fields) - {"reply", "prompt"}
     return turn.model_dump(include=fields, exclude={"parse": {"rule"}}, exclude_none=True)

@@ -1,10 +1,10 @@
 """Blocks released under physics: states, building orders, and plans with poses.
 
 Three facts save time. Structures that are proven to stand (`balance`) need no trial, except large
-finished ones (`check`). Blocks that are far from one another cannot disturb one another, so they
-are tried group by group (`groups`), each as if it were at the origin: in PyBullet, the last digits
-of a position decide if wheels under a plank roll away. And a group that is quiet for a while is at
-rest (`moments`), since an unsupported load of .2 % of a block's weight would show.
+finished ones (`check`). Blocks that are far apart cannot disturb each other, so they are tried
+group by group (`groups`), each as if it were at the origin: in PyBullet, the last digits of a
+position decide if wheels under a plank roll away. And a group that is quiet for a while is at rest
+(`moments`), since an unsupported load of 0.2 % of a block's weight would show.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from phyblock.types import StepEnd
 
 @dataclass(frozen=True)
 class Trial:
-    """A test of stability: simulated time [s], limits of movement, at each of `physics`."""
+    """A test of stability: simulated time [s] and limits of movement, for each of `physics`."""
 
     duration_s: float = 2.0
     limit_m: float = 0.005
@@ -42,7 +42,7 @@ class Trial:
 
 DEFAULT_TRIAL = Trial()
 ONE_SETTING = Trial(physics=DEFAULT_TRIAL.physics[:1])
-"""A trial at the first setting alone, a third of the cost, not used for scores."""
+"""A trial with the first setting only, at a third of the cost; not used for scores."""
 
 
 REST_SPEED_M_S = 0.005
@@ -55,7 +55,7 @@ _COLLAPSE_S = 3.0  # Time for fallen blocks to come to rest [s].
 
 @dataclass(frozen=True)
 class Stability:
-    """Result of a trial: orders that passed a limit, and the largest movement [m].
+    """Result of a trial: orders of blocks that passed a limit, and the largest movement [m].
 
     `agreed` is true if all settings name the same blocks.
     """
@@ -94,7 +94,7 @@ def execution_physics(goal: Sequence[Block]) -> Physics | None:
 def check(
     blocks: Sequence[Block], trial: Trial = DEFAULT_TRIAL, quiet_s: float | None = None
 ) -> Stability:
-    """Release each group and see which blocks stay, to the end or until quiet for `quiet_s`.
+    """Release each group, to the end or until quiet for `quiet_s`, and return its stability.
 
     Groups that are proven to stand are not simulated, up to `MOST_PROVEN` blocks in all.
     """
@@ -104,7 +104,7 @@ def check(
 
 
 def check_steps(blocks: Sequence[Block], trial: Trial = DEFAULT_TRIAL) -> tuple[Stability, ...]:
-    """Stability after each step: only the group of the block just placed is tried."""
+    """Return the stability after each step: only the group of the block just placed is tried."""
     near = [
         next(g for g in groups(blocks[:n]) if blocks[n - 1] in g) for n in range(1, len(blocks) + 1)
     ]
@@ -112,7 +112,7 @@ def check_steps(blocks: Sequence[Block], trial: Trial = DEFAULT_TRIAL) -> tuple[
 
 
 def _try_groups(parts: Sequence[Sequence[Block]], trial: Trial, quiet_s: float | None) -> Stability:
-    """Let groups go one after another, under each setting in a world of its own."""
+    """Release groups one after another, in a new world for each setting."""
     settings = []
     for physics in trial.physics if parts else ():
         with open_world(physics) as world:
@@ -131,7 +131,7 @@ def _is_proven(blocks: tuple[Block, ...]) -> bool:
 
 
 def groups(blocks: Sequence[Block], reach_m: float = REACH_M) -> tuple[tuple[Block, ...], ...]:
-    """The blocks in groups with more than `reach_m` [m] of free space between them."""
+    """Return the blocks in groups with more than `reach_m` [m] of free space between them."""
     boxes = [bounds_m(block) for block in blocks]
     found: list[list[int]] = []
     for at, box in enumerate(boxes):
@@ -141,7 +141,7 @@ def groups(blocks: Sequence[Block], reach_m: float = REACH_M) -> tuple[tuple[Blo
 
 
 def movement(blocks: Sequence[Block], poses: Mapping[int, Pose], trial: Trial) -> Stability:
-    """Distance of blocks from their goal poses, and the orders of those beyond a limit."""
+    """Return the movement of blocks from their goal poses, and the orders beyond a limit."""
     moved = {b.order: poses[b.order].distance_m(Pose.goal(b)) for b in blocks}
     turned = {b.order: poses[b.order].angle_deg(Pose.goal(b)) for b in blocks}
     fallen = (o for o in moved if moved[o] > trial.limit_m or turned[o] > trial.limit_deg)
@@ -149,12 +149,12 @@ def movement(blocks: Sequence[Block], poses: Mapping[int, Pose], trial: Trial) -
 
 
 def wait(world: World, limit_s: float, quiet_s: float = QUIET_S) -> bool:
-    """Simulate until all is at rest; True if that was within `limit_s` [s]."""
+    """Simulate until all blocks are at rest; True if that was within `limit_s` [s]."""
     return any(moments(world, limit_s, quiet_s))
 
 
 def moments(world: World, limit_s: float, quiet_s: float = QUIET_S) -> Iterator[bool]:
-    """Simulate in short intervals up to `limit_s` [s]; yield True once all is at rest."""
+    """Simulate in short intervals up to `limit_s` [s]; yield True once all blocks are at rest."""
     every_s = max(_EVERY_S, world.physics.time_step_s)
     since_s = 0.0
     for _ in range(round(limit_s / every_s)):
@@ -164,7 +164,7 @@ def moments(world: World, limit_s: float, quiet_s: float = QUIET_S) -> Iterator[
 
 
 def _tried(world: World, group: Sequence[Block], trial: Trial, quiet_s: float | None) -> Stability:
-    """Movement of a group, alone in the world for this trial, as if it were at the origin."""
+    """Return the movement of a group, alone in the world and as if it were at the origin."""
     arranged = _arrangement(group)
     with _placed(world, arranged):
         if quiet_s is None:
@@ -206,17 +206,17 @@ class Settled(NamedTuple):
 
 
 def settle(blocks: Sequence[Block], trial: Trial = DEFAULT_TRIAL) -> Settled:
-    """Release blocks at their goal poses; they fall if they do under any setting.
+    """Release blocks at their goal poses; a block falls if it does under any setting.
 
-    Each arrangement of a group is tried once, and a verdict does not depend on earlier trials. For
-    any thread.
+    Each arrangement of a group is tried once, and a verdict does not depend on earlier trials. May
+    be called from any thread.
     """
     with _ONE_AT_A_TIME:
         return _settled(tuple(blocks), trial, physics_engine())
 
 
 def stands(blocks: Sequence[Block], trial: Trial = DEFAULT_TRIAL) -> bool:
-    """True if all stay where they are under every setting; for any thread, as `settle`."""
+    """True if all blocks stay under every setting; for any thread, as `settle`."""
     with _ONE_AT_A_TIME:
         engine = physics_engine()
         return all(_stays(_arrangement(group), trial, engine) for group in groups(blocks))
@@ -252,12 +252,12 @@ def _stays(group: tuple[Block, ...], trial: Trial, engine: PhysicsEngine) -> boo
 
 @functools.cache
 def _kept_world(physics: Physics, engine: PhysicsEngine) -> World:
-    """A world for groups, one after another: PyBullet takes longer to open one than to try one."""
+    """Return a world for many groups: in PyBullet, opening one takes longer than a trial."""
     return _OPEN.enter_context(open_world(physics, engine))
 
 
 def _arrangement(group: Sequence[Block]) -> tuple[Block, ...]:
-    """Everything that a group's stability depends on: the first block at the origin, no colors."""
+    """Return all that a group's stability depends on: first block at the origin, no colors."""
     x0, y0, _ = group[0].position_m
     kept = []
     for number, block in enumerate(group, 1):
@@ -267,7 +267,7 @@ def _arrangement(group: Sequence[Block]) -> tuple[Block, ...]:
     return tuple(kept)
 
 
-LONGEST_S = 600.0  # Execution of a plan is given up after this time [s].
+LONGEST_S = 600.0  # Time after which execution of a plan is given up [s].
 _TRIES = 16
 _CM = 100.0
 _DIGITS = 3
@@ -275,7 +275,7 @@ _DIGITS = 3
 
 @dataclass(frozen=True)
 class ExecutionLimits:
-    """Limits of moving a block out of others, and of movement and turn of a standing block."""
+    """Limits of moving a block out of overlaps, and of movement and turn of a standing block."""
 
     overlap_cm: float = 0.5
     stand_cm: float = 1.0
@@ -335,7 +335,7 @@ def execute(
 
 
 class Executor:
-    """Execution of a plan with poses, step by step; a context manager.
+    """Executes a plan with poses, step by step; a context manager.
 
     A block that overlaps others by no more than a tolerance is moved out the shortest way, and one
     that floats by no more is lowered; one that overlaps more is refused. It is released together
@@ -399,7 +399,7 @@ class Executor:
         return ExecutedStep(end, moved_cm, turned_deg, gap, given, knocked)
 
     def _let_go(self, block: Block) -> dict[int, Pose]:
-        """Poses at rest of the block and of all others that it could move."""
+        """Return the poses at rest of the block and of all others that it could move."""
         self._resting[block.order] = block
         apart = groups(self.blocks)
         near: tuple[Block, ...] = ()
@@ -443,7 +443,7 @@ class Executor:
 def _out_of_others(
     block: Block, others: Sequence[Block], most_m: float
 ) -> tuple[Block | None, float]:
-    """The block moved out of others and of the floor, and the distance [m]."""
+    """Return the block moved out of others and the floor, None if too far, and the distance [m]."""
     start = place = np.array(block.position_m)
     for _ in range(_TRIES):
         way = _way_out(block, others)
@@ -459,7 +459,7 @@ def _out_of_others(
 
 
 def _way_out(block: Block, others: Sequence[Block]) -> NDArray[np.float64]:
-    """The shortest way out of the deepest overlap, shape (3,) [m]; zero where there is none."""
+    """Return the shortest way out of the deepest overlap, shape (3,) [m]; zero if there is none."""
     box = bounds_m(block)
     deepest = np.array([0.0, 0.0, max(0.0, -float(box[0, 2]))])
     for other in others:

@@ -101,7 +101,7 @@ def _turned(subject: PlanSubject, block: Block, rng: np.random.Generator) -> int
 
 
 def needed_candidate(subject: Any, block: Block) -> int:
-    """Return the number of the candidate that looks like a block. Raises DataError for none."""
+    """Return the number of the candidate that looks like a block. Raises DataError if none does."""
     index: int | None = subject.candidates.index_of(block.look)
     if index is None:
         found = f"{block.color} {block.type} turned {block.euler_deg}"
@@ -139,11 +139,11 @@ def pick_plan(subject: PlanSubject) -> Picking:
 
 
 def pose_counts(item: AssemblyTask, record: Any) -> tuple[int, ...]:
-    """Count the named kinds whose pose could be wrong, for a plan or an episode: those named first
-    in the right pose, and all, where the pose that is listed first is right; then the others.
+    """Count the kinds that a plan or an episode names and whose pose could be wrong.
 
-    Such a kind is needed in one or more poses, and also offered in others. Numbers that no
-    candidate has are ignored.
+    These are needed in some poses and offered in others, too. Returns the number that is first
+    named in a right pose and the total, for kinds whose first listed pose is right, then for all
+    others. Numbers that no candidate has are ignored.
     """
     offered, chosen = item.offered, dict[Kind, bool]()
     for step in record.parse.plan:
@@ -163,7 +163,7 @@ POSE_COUNTS = SampleCounts(
 
 
 def _steps(score: Score) -> tuple[float, ...]:
-    """Count steps; under `membership` repeated ones count again, so no single plan has a value."""
+    """Count steps; under `membership`, repeated ones count again, so single plans have no value."""
     alone = score.criterion != "membership"
     f1 = Counts(score.tp, score.fp, score.fn).f1 or 0.0
     whole = alone and score.fp == score.fn == 0
