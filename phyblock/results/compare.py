@@ -211,9 +211,9 @@ class Comparable:
 
         def worth(of: Floats) -> Floats:
             single = measure.value(of)
-            there = np.broadcast_to(asked, single.shape)
-            known = {name: (single[..., n], there[..., n]) for n, name in enumerate(pooled)}
-            return cell_value(cell, self.cells, known)[0]
+            known = {name: single[..., n] for n, name in enumerate(pooled) if asked[n]}
+            lacking = np.full(single.shape[:-1], np.nan)
+            return cell_value(cell, self.cells, known) if known else lacking
 
         clusters, scale = statistics.Clusters.of([parents[name] for name in scenes]), measure.scale
         estimate = statistics.bounded(
@@ -246,17 +246,15 @@ def comparable(run: Run, track: str, measure: str = "") -> Comparable:
     chosen = known[measure] if measure else headline.measure
     columns = headline.columns
     cells = {cell.name: cell for cell in chosen.counted.cells or run.cells(track)}
-    criteria = [s.criterion for s in columns if s.measure == chosen.name and s.criterion]
+    criteria = [s.criterion for s in columns if s.measure == chosen.name and s.criterion] or [""]
     # A pooled part of a mean is too small to be compared alone.
     joined = {name for cell in cells.values() for name in cell.of}
     names = [name for name, cell in cells.items() if cell.of or name not in joined]
-    parts = [Part(name, name) for name in names]
-    if criteria:
-        parts = [Part(one, name, one) for name in names for one in reversed(criteria)]
+    parts = tuple(Part(one or name, name, one) for name in names for one in reversed(criteria))
     is_shown = chosen.name in {column.measure for column in columns}
     notes = track_notes(run, track) if is_shown else ()
     how = " ".join((f"{chosen.heading}: {chosen.meaning}.", *notes, "Samples that both have."))
-    return Comparable(track, chosen, cells, tuple(parts), how)
+    return Comparable(track, chosen, cells, parts, how)
 
 
 @dataclass(frozen=True, eq=False)
@@ -349,8 +347,7 @@ def compare_pairs(
     if a run was scored differently, asked other questions, or has other blocks in a scene of the
     same name.
     """
-    sides = list({side.label: side for pair in pairs for side in pair}.values())
-    place = {side.label: n for n, side in enumerate(sides)}
+    sides = list(dict.fromkeys(side for pair in pairs for side in pair))
     runs = list({id(side.run): side.run for side in sides}.values())
     for run in runs[1:]:
         check_pair(run, runs[0], [part.cell for part in parts], what.track, what.measure)
@@ -360,7 +357,7 @@ def compare_pairs(
         samples = what.samples(sides, part, pairs[0][0].run.design)
         for a, b in pairs:
             about = {"a": a.label, "b": b.label, "part": part.name}
-            pair = [place[a.label], place[b.label]]
+            pair = [sides.index(a), sides.index(b)]
             rows.append({**about, **what.contrast(samples, pair, part, parents)})
     table, measure = pd.DataFrame(rows), what.measure
     n_tests = int(table["p"].notna().sum())
@@ -462,29 +459,18 @@ def compare_view(found: Comparison) -> TextTable:
         Column.whole("worse", "B better", "Samples"),
         Column.whole("same", "same", "Samples"),
     ]
-    title = "Models compared on the same samples"
-    return TextTable.of(found.table, title, columns, _notes(found))
-
-
-def _notes(found: Comparison) -> Iterator[str]:
-    table = found.table
-    yield found.how
-    if len(table):
-        most = table.to_dict("records")[int(table["n_scenes"].argmax())]
-        yield (
-            f"{counted(most['n_samples'], 'sample')} of {counted(most['n_scenes'], 'scene')} from "
-            f"{counted(most['n_clusters'], 'base scene')}; scenes that share one are not taken as "
-            "independent."
-        )
-        yield (
-            "“finds”: the difference that this comparison would find in "
-            f"{statistics.POWER:.0%} of cases. {NO_VALUE}: none that is possible, or no sample "
-            "differs."
-        )
-    yield (
-        f"p values are corrected for {table['p'].notna().sum()} comparisons (Holm); “cannot tell” "
-        "stands where p is 0.05 or more."
+    most = found.table.to_dict("records")[int(found.table["n_scenes"].argmax())]
+    notes = (
+        found.how,
+        f"{counted(most['n_samples'], 'sample')} of {counted(most['n_scenes'], 'scene')} from "
+        f"{counted(most['n_clusters'], 'base scene')}; scenes that share one are not taken as "
+        "independent.",
+        f"“finds”: the difference that this comparison would find in {statistics.POWER:.0%} of "
+        f"cases. {NO_VALUE}: none that is possible, or no sample differs.",
+        f"p values are corrected for {found.table['p'].notna().sum()} comparisons (Holm); “cannot "
+        "tell” stands where p is 0.05 or more.",
     )
+    return TextTable.of(found.table, "Models compared on the same samples", columns, notes)
 
 
 def ranks_view(found: Comparison) -> TextTable:
@@ -502,7 +488,7 @@ def ranks_view(found: Comparison) -> TextTable:
 
 
 def write_comparison(found: Comparison, folder: Path) -> tuple[Path, ...]:
-    """Write comparison (.csv, .tex) and ranks.csv into `folder`.
+    """Write comparison (.csv, .md, .tex) and ranks.csv into `folder`.
 
     Raises StoreError if they cannot be written.
     """
@@ -525,7 +511,7 @@ def sensitivity_frame(run: Run) -> pd.DataFrame:
     the model answered under every condition. See `phyblock.scoring.statistics`. Repeats are no
     factor. Empty if the run varies nothing.
     """
-    rows: list[dict[str, Any]] = []
+    rows: list[tuple[object, ...]] = []
     suite, parents = run.design.suite, base_scenes(run)
     factors = [factor for factor in suite.vary.factors if factor != REPEAT]
     ways = [(seed, one.key) for seed in suite.seeds for one in suite.vary.variants]
@@ -547,10 +533,8 @@ def sensitivity_frame(run: Run) -> pd.DataFrame:
                 levels = np.moveaxis(scores, place, 1)
                 part = statistics.shift(levels.reshape(*levels.shape[:2], -1), clusters)
                 sd, lo, hi = (what.measure.scale * end for end in (part.sd, part.lo, part.hi))
-                row = {"track": track, "model": side.model, "factor": factor, "shift": sd}
-                row |= {"levels": levels.shape[1], "shift_lo": lo}
-                row["shift_hi"] = np.minimum(hi, what.measure.most_apart)
-                rows.append(row | {"n_items": len(whole), "n_clusters": clusters.size})
+                shift = (levels.shape[1], sd, lo, np.minimum(hi, what.measure.most_apart))
+                rows.append((track, side.model, factor, *shift, len(whole), clusters.size))
     return pd.DataFrame(rows, columns=list(_COLUMNS))
 
 

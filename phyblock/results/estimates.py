@@ -158,20 +158,17 @@ def _sums(
     return sums.reshape(*shape, *sums.shape[1:]), rows.reshape(*shape, len(masks))
 
 
-def cell_value(
-    cell: Cell, cells: Mapping[str, Cell], single: Mapping[str, tuple[Floats, NDArray[np.bool_]]]
-) -> tuple[Floats, NDArray[np.bool_]]:
-    """Return the values of a cell from those of cells that are not means, and where it has one.
+def cell_value(cell: Cell, cells: Mapping[str, Cell], single: Mapping[str, Floats]) -> Floats:
+    """Return the values of a cell from `single`, those of cells that are not means.
 
-    A mean is over the parts that exist, as given in `single` with their values.
+    A mean is over the parts that are there, of which a cell must have at least one.
     """
     if not cell.of:
         return single[cell.name]
-    parts = [cell_value(cells[name], cells, single) for name in cell.of]
-    values, there = (np.stack(of, axis=-1) for of in zip(*parts, strict=True))
-    whole = there.sum(axis=-1)
-    mean = np.where(there, values, 0).sum(axis=-1) / np.where(whole, whole, 1)
-    return np.where(whole > 0, mean, np.nan), whole > 0
+    there = [cells[name] for name in cell.of if single.keys() & pooled_in(cells[name], cells)]
+    values = np.stack([cell_value(part, cells, single) for part in there], axis=-1)
+    mean: Floats = values.sum(axis=-1) / len(there)
+    return mean
 
 
 def pooled_in(cell: Cell, cells: Mapping[str, Cell]) -> list[str]:
@@ -213,9 +210,8 @@ def _estimates(
         values = []
         for measure in measures:
             value = measure.value(spoken)
-            known = {name: (value[..., n], np.ones(value.shape[:-1], dtype=bool))
-                     for n, name in enumerate(pooled)}  # fmt: skip
-            values.append(np.stack([cell_value(c, by_name, known)[0] for c in cells], axis=-1))
+            known = {name: value[..., n] for n, name in enumerate(pooled)}
+            values.append(np.stack([cell_value(c, by_name, known) for c in cells], axis=-1))
         return np.stack(values, axis=-1)
 
     members = np.array([[n in pooled_in(cell, by_name) for n in pooled] for cell in cells])
@@ -227,7 +223,13 @@ def _estimates(
     usable = np.repeat(np.where(fewest < 2, fewest, behind)[:, :, None], len(measures), axis=-1)
     estimate = jackknife(given, clusters, all_values, n_clusters=usable)
     within = in_range(estimate, [measure.end_of_range for measure in measures])
-    spread = _over_seeds(all_values(of_seeds))
+    each_seed = all_values(of_seeds)
+    with warnings.catch_warnings():
+        # Where no seed has a value, there is none.
+        warnings.simplefilter("ignore", RuntimeWarning)
+        mean, sd = np.nanmean(each_seed, axis=0), np.nanstd(each_seed, axis=0, ddof=1)
+    ends = np.fmin.reduce(each_seed), np.fmax.reduce(each_seed)
+    spread = ((~np.isnan(each_seed)).sum(axis=0), mean, sd, *ends)
     n_scenes = np.stack([one.sum(axis=0) for one in each], axis=-1)
     samples = n_rows.sum(axis=0) @ members.T
     for at in np.ndindex(estimate.value.shape):
@@ -238,15 +240,6 @@ def _estimates(
             *(within.lo[at], within.hi[at], estimate.se[at]),
             *(int(n_scenes[g, c]), int(behind[g, c])),
         )
-
-
-def _over_seeds(each: Floats) -> tuple[NDArray[np.intp], Floats, Floats, Floats, Floats]:
-    """Return the number of seeds with a value, and their mean, sample sd, least and most."""
-    with warnings.catch_warnings():
-        # Where no seed has a value, there is none.
-        warnings.simplefilter("ignore", RuntimeWarning)
-        mean, sd = np.nanmean(each, axis=0), np.nanstd(each, axis=0, ddof=1)
-    return (~np.isnan(each)).sum(axis=0), mean, sd, np.fmin.reduce(each), np.fmax.reduce(each)
 
 
 def track_notes(run: Run, track: str) -> tuple[str, ...]:
@@ -382,12 +375,9 @@ class Headline:
         known = [Floor(model, one.value) for model, one in self.ranked.items() if model in blind]
         if guessed is not None and len(track_estimates(run, self.track)):
             cells = {cell.name: cell for cell in run.cells(self.track)}
-            cell, is_there = cells[self.main.cell], np.ones((), dtype=bool)
-            single = {
-                name: (np.asarray(guessed(run.design.suite, name)), is_there)
-                for name in pooled_in(cell, cells)
-            }
-            worth = float(cell_value(cell, cells, single)[0])
+            pooled = pooled_in(cell := cells[self.main.cell], cells)
+            single = {name: np.asarray(guessed(run.design.suite, name)) for name in pooled}
+            worth = float(cell_value(cell, cells, single))
             known.append(Floor("chance", measure.scale * worth))
         best = max if measure.better == "higher" else min
         return best(known, key=lambda floor: floor.value) if known else None

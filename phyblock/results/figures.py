@@ -16,11 +16,7 @@ import numpy as np
 import pandas as pd
 
 from phyblock.files import OutFolder, cache_dir
-from phyblock.results.compare import (
-    compare,
-    sensitivity_frame,
-    sizes_text,
-)
+from phyblock.results.compare import compare, sensitivity_frame, sizes_text
 from phyblock.results.estimates import Headline, shown_values
 from phyblock.results.load import Run
 from phyblock.results.tables import coverage_frame
@@ -202,10 +198,9 @@ def shares(run: Run, *, track: str, table: str) -> Figure | None:
     names = [name for spec in layout.columns for name in spec.measures]
     names = names if isinstance(layout.rows, str) else list(layout.rows)
     found = {
-        model: [values[key].value if (key := (model, name, whole, "")) in values else math.nan
-                for name in names]
+        model: [getattr(values.get((model, n, whole, "")), "value", math.nan) for n in names]
         for model in Headline(run, track).ranked
-    }  # fmt: skip
+    }
     models = [model for model, row in found.items() if not np.isnan(row).all()]
     drawn = np.nan_to_num([found[model] for model in models])
     if not drawn.any():

@@ -8,19 +8,14 @@ from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import pandas as pd
 
 from phyblock.files import OutFolder
 from phyblock.registry import added_measures
 from phyblock.results.compare import rank_ranges_of, rank_text, sensitivity_table, sides_of
-from phyblock.results.estimates import (
-    Headline,
-    Value,
-    shown_values,
-    track_notes,
-)
+from phyblock.results.estimates import Headline, Value, shown_values, track_notes
 from phyblock.results.load import TOKENS, Run, load_run, track_measures
 from phyblock.results.paper import beside_paper, is_as_published
 from phyblock.results.text import (
@@ -69,21 +64,22 @@ def filled(run: Run, track: str, layout: Layout) -> TextTable:
     # The subject of a row besides its model: a measure, a cell, or nothing.
     parts = {"": ""}
     if layout.rows == "cell":
-        with_values = {cell for measure, cell in there if measure in {one.measure for one in shown}}
+        asked = {measure for _, _, (measure, _, _) in shown}
+        with_values = {cell for measure, cell in there if measure in asked}
         parts = {cell.name: cell.heading for cell in cells if cell.name in with_values}
     elif layout.rows != "model":
         parts = {name: measures[name].heading for name in layout.rows}
     rows = []
     for model, part in product(run.design.model_names, parts):
         row: dict[str, Any] = {"model": model, **({"part": part} if part else {})}
-        for one in shown:
-            key = (model, one.measure or part, one.cell or part, one.criterion)
-            row |= {name: getattr(known.get(key, _NONE), end) for name, end in one.ends.items()}
+        for _, ends, (measure, cell, criterion) in shown:
+            value = known.get((model, measure or part, cell or part, criterion), _NONE)
+            row |= {name: getattr(value, end) for name, end in ends.items()}
         rows.append(row)
     fields = [Column.text("model", "Model", once=True)]
     if layout.rows != "model":
         fields.append(Column("", "", True, lambda row: parts[row["part"]]))
-    fields += [one.column for one in shown]
+    fields += [column for column, _, _ in shown]
     caption = captioned(f"{layout.caption}{run.design.of_suite}", run.presentation(track))
     notes = (*track_notes(run, track), *layout.notes, *_sample_notes(run, track))
     return TextTable.of(
@@ -91,25 +87,17 @@ def filled(run: Run, track: str, layout: Layout) -> TextTable:
     )
 
 
-class _Shown(NamedTuple):
-    """A column of numbers: its measure and cell ("" for those of the row), and `ends`: the parts of
-    values that its columns in the frame hold.
-    """
-
-    column: Column
-    ends: Mapping[str, str]
-    measure: str
-    cell: str
-    criterion: str
-
-
 def _shown(
     layout: Layout,
     measures: Mapping[str, Measure],
     cells: Sequence[Cell],
     there: set[tuple[str, str]],
-) -> Iterator[_Shown]:
-    """Yield the columns of a layout that have an estimate."""
+) -> Iterator[tuple[Column, dict[str, str], tuple[str, str, str]]]:
+    """Yield the columns of a layout that have an estimate.
+
+    Each is with its columns in the frame, as the parts of a value that they hold, and with its
+    measure and cell ("" for those of the row) and criterion.
+    """
     of_rows = [] if isinstance(layout.rows, str) else list(layout.rows)
     for spec, cell in [(one, at) for one in layout.columns for at in one.places(cells)]:
         asked = list(spec.headings) or of_rows
@@ -128,10 +116,10 @@ def _shown(
             at = (name, "" if layout.rows == "cell" else cell.name, spec.criterion)
             if spec.show != "interval":
                 shown = Column.value(key, heading or unit, group, spec.digits)
-                yield _Shown(shown, {key: "value"}, *at)
+                yield shown, {key: "value"}, at
             if spec.show != "value":
                 lo, hi = f"{key}_lo", f"{key}_hi"
-                yield _Shown(Column.interval(group, lo, hi), {lo: "lo", hi: "hi"}, *at)
+                yield Column.interval(group, lo, hi), {lo: "lo", hi: "hi"}, at
 
 
 def _sample_notes(run: Run, track: str) -> Iterator[str]:
@@ -215,13 +203,11 @@ def coverage_table(run: Run) -> TextTable:
     """Return a table of the outcomes of every model's samples."""
     table = coverage_frame(run)
     fields = [Column.text("model", "Model"), *Column.track(run.design.suite.tracks)]
+    headings = {"ok": "OK", "api_error": "API error"}
     for name in ("expected", "not_run", *OUTCOMES):
-        fields.append(Column.whole(name, _HEADINGS.get(name, name.replace("_", " ").capitalize())))
+        fields.append(Column.whole(name, headings.get(name, name.replace("_", " ").capitalize())))
     notes = ["The last line of records.jsonl was cut off and is ignored."] if run.is_cut else []
     return TextTable.of(table[_COVERAGE], f"Coverage{run.design.of_suite}", fields, notes)
-
-
-_HEADINGS = {"ok": "OK", "parse_failure": "Parse failure", "api_error": "API error"}
 
 
 def cost_table(run: Run) -> TextTable:
