@@ -51,10 +51,6 @@ class BatchFiles:
     recorded: Collection[str] = ()
     expected: int = 0
 
-    def answers(self, token: str) -> Path:
-        """Return the file of a batch's answers, which exists once it has ended."""
-        return self.run_folder / "batches" / f"{token}.answers.jsonl"
-
 
 @dataclass(eq=False)
 class Batch:
@@ -216,9 +212,7 @@ class BatchModel:
                 raise
         finally:
             self._is_writing = False
-        usd, held = self.budget.most_usd(estimate(self.config, request), batched=True), None
-        if usd is not None:
-            held = await self.budget.reserve(partial(float, usd), together=True)
+        held = await self.budget.reserve(estimate(self.config, request), batched=True)
         if self._refusal is not None:
             if held is not None:
                 self.budget.settle(held, 0.0)
@@ -235,7 +229,7 @@ class BatchModel:
         draft.lines.append(self._provider.line(name, http.body, http.headers))
         draft.size_bytes += len(draft.lines[-1])
         draft.grown_s = time.monotonic()
-        draft.most_usd[key] = usd
+        draft.most_usd[key] = None if held is None else held.usd
         if held is not None:
             draft.held[key] = held
         self._newest[key] = draft
@@ -282,7 +276,8 @@ class BatchModel:
                 raise
         elif batch.event == "intended" and self._refusal is not None:
             raise self._refusal
-        path = self.files.answers(batch.token)
+        # It exists once the batch has ended.
+        path = self.files.run_folder / "batches" / f"{batch.token}.answers.jsonl"
         lines = None
         if batch.event == "ended" and path.exists():
             lines = await asyncio.to_thread(path.read_bytes)

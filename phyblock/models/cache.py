@@ -56,7 +56,7 @@ def reply_key(config: ModelConfig, request: Request) -> str:
     return hex_digest(canonical)
 
 
-class ReplyCache:
+class ReplyCache(contextlib.AbstractContextManager["ReplyCache"]):
     """Replies by key, in one SQLite file that several processes may have open.
 
     Two processes that send the same request at the same time may both pay for it; the later reply
@@ -84,9 +84,6 @@ class ReplyCache:
                 raise
         except sqlite3.Error as error:
             raise self._problem(f"cannot be used: {error}") from error
-
-    def __enter__(self) -> ReplyCache:
-        return self
 
     def __exit__(self, *_: object) -> None:
         self.close()

@@ -136,7 +136,10 @@ def api_key_status(config: ModelConfig) -> KeyStatus:
     """Return the state of the model's key in the environment."""
     if config.kind != "litellm":
         return KeyStatus((), None, is_needed=False)
-    variables = _variables(config)
+    usual = f"{config.provider.upper().replace('-', '_')}_API_KEY"
+    variables = _KEY_VARIABLES.get(config.provider, (usual,))
+    if config.api_key_env is not None:
+        variables = (config.api_key_env,)
     keys = (os.environ.get(name, "").strip() for name in variables)
     is_needed = config.api_key_env is not None or not (
         config.addresses or config.provider in KEYLESS + _OWN_CREDENTIALS
@@ -189,7 +192,7 @@ def secrets_of(config: ModelConfig) -> tuple[str, ...]:
     for others than the model's key) and common words for "no key" are excluded: removing them would
     ruin texts and hide nothing.
     """
-    own = _variables(config)
+    own = api_key_status(config).variables
     secrets = {
         value.strip()
         for name, value in os.environ.items()
@@ -198,13 +201,6 @@ def secrets_of(config: ModelConfig) -> tuple[str, ...]:
     }
     secrets = {value for value in secrets if value.lower() not in _PLACEHOLDERS}
     return tuple(sorted(secrets, key=lambda value: (-len(value), value)))
-
-
-def _variables(config: ModelConfig) -> tuple[str, ...]:
-    if config.api_key_env is not None:
-        return (config.api_key_env,)
-    usual = f"{config.provider.upper().replace('-', '_')}_API_KEY"
-    return _KEY_VARIABLES.get(config.provider, (usual,))
 
 
 def hidden(text: str, secrets: Iterable[str], *, guess: bool = True) -> str:
@@ -429,7 +425,7 @@ class OpenAIClient(Client):
         if seed is not None:
             fields["seed"] = seed
         fields |= extra_body
-        body = json_body(fields, request.messages, self.config.image_detail)
+        body = json_body(fields, request, self.config.image_detail)
         answer = await self.http.send(self._url, body, headers)
         return read_completion(read_json(answer), answer.status)
 
@@ -563,7 +559,7 @@ def read_chat_completion(raw: object) -> Reply | None:
     return _reply(
         text or _text(refusal),
         "\n".join(filter(None, (beside, thoughts))),
-        "refusal" if refusal and not text else _finish(_get(choice, "finish_reason")),
+        "refusal" if refusal and not text else _get(choice, "finish_reason"),
         usage,
         _get(raw, "model"),
     )
@@ -574,18 +570,16 @@ def _anthropic(raw: object) -> Reply | None:
     content = _get(raw, "content")
     if not isinstance(content, list) or not all(isinstance(b, Mapping) for b in content):
         return None
-    fresh, out = _count(raw, "usage.input_tokens"), _count(raw, "usage.output_tokens")
-    usage = Usage(completion_tokens=out)
-    if fresh is not None:
-        cached = _count(raw, "usage.cache_read_input_tokens")
-        written = _count(raw, "usage.cache_creation_input_tokens")
-        usage = Usage(
-            prompt_tokens=fresh + (cached or 0) + (written or 0),
-            completion_tokens=out,
-            cached_tokens=cached,
-            cache_write_tokens=written,
-        )
-    return _reply(*_parts(content), _finish(_get(raw, "stop_reason")), usage, _get(raw, "model"))
+    fresh = _count(raw, "usage.input_tokens")
+    cached = _count(raw, "usage.cache_read_input_tokens")
+    written = _count(raw, "usage.cache_creation_input_tokens")
+    usage = Usage(
+        prompt_tokens=None if fresh is None else fresh + (cached or 0) + (written or 0),
+        completion_tokens=_count(raw, "usage.output_tokens"),
+        cached_tokens=cached,
+        cache_write_tokens=written,
+    )
+    return _reply(*_parts(content), _get(raw, "stop_reason"), usage, _get(raw, "model"))
 
 
 def _gemini(raw: object) -> Reply | None:
@@ -603,32 +597,27 @@ def _gemini(raw: object) -> Reply | None:
         reasoning_tokens=_count(counts, "thoughtsTokenCount", "thoughts_token_count"),
         cached_tokens=_count(counts, "cachedContentTokenCount", "cached_content_token_count"),
     )
-    finish = _finish(_get(candidate, "finishReason", "finish_reason"))
+    finish = "refusal" if blocked else _get(candidate, "finishReason", "finish_reason")
     text, thoughts = _parts(_get(candidate, "content.parts"))
     model = _get(raw, "modelVersion", "model_version")
-    return _reply(text, thoughts, "refusal" if blocked else finish, usage, model)
+    return _reply(text, thoughts, finish, usage, model)
 
 
 def _reply(
     text: str,
     reasoning: str = "",
-    finish: Finish = "unknown",
+    finish: object = "",
     usage: Usage | None = None,
     model: object = "",
 ) -> Reply:
-    """Return a reply with lone surrogates, which no file can hold, replaced."""
+    """Return a reply without lone surrogates, which no file can hold, with its Finish by a word."""
     return Reply(
         text=well_formed(text),
         reasoning=well_formed(reasoning),
-        finish=finish,
+        finish=_FINISH.get(str(finish).rpartition(".")[2].lower(), "unknown"),
         usage=usage or Usage(),
         provider_model=well_formed(_text(model)),
     )
-
-
-def _finish(word: object) -> Finish:
-    """Return the Finish for a provider's word."""
-    return _FINISH.get(str(word).rpartition(".")[2].lower(), "unknown")
 
 
 def _parts(content: object) -> tuple[str, str]:

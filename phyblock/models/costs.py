@@ -12,7 +12,7 @@ import importlib.util
 import json
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -210,23 +210,21 @@ class ModelBudget:
             raise UnavailableError(f"{why}: set it in models.yaml, or run without max_cost_usd")
         return most_usd(self.tariff, prompt, longest, batched=batched)
 
-    async def reserve(
-        self, most_usd: Callable[[], float], *, together: bool = False
-    ) -> Reservation:
-        """Reserve the most that a call can cost, waiting for calls in progress to settle if needed.
+    async def reserve(self, expected: Estimate, *, batched: bool = False) -> Reservation | None:
+        """Reserve the most that a call can cost, waiting for calls in progress to settle if needed;
+        None without a price.
 
-        `most_usd` is computed again whenever a call has settled, since more is known of the model
-        then. Calls that are sent `together` do not wait for the first ones. Raises
-        BudgetReachedError if it exceeds the limit with no call in progress.
+        It is computed again whenever a call has settled, since more is known of the model then.
+        Calls of a batch do not wait for the first ones. Raises BudgetReachedError if it exceeds the
+        limit with no call in progress, and as `most_usd`.
         """
         run = self._run
-        while True:
-            usd = most_usd()
+        while (usd := self.most_usd(expected, batched=batched)) is not None:
             is_slow = self.is_limited and len(self._under_way) > self._settled
             fits = run.spent_usd + run.held_usd + usd <= run.max_usd
-            if fits and (together or not is_slow):
+            if fits and (batched or not is_slow):
                 reservation = self.hold(usd)
-                if not together:
+                if not batched:
                     self._under_way.add(reservation)
                 return reservation
             if not run.holds and run.spent_usd + usd > run.max_usd:
@@ -234,6 +232,7 @@ class ModelBudget:
                 raise BudgetReachedError(f"{spent}; the next call can cost ${usd:.4f}")
             run.changed.clear()
             await run.changed.wait()
+        return None
 
     def hold(self, usd: float) -> Reservation:
         """Make a reservation even if it exceeds the limit."""
@@ -339,41 +338,11 @@ def text_tokens(model_id: str, text: str) -> float:
     return len(_PIECE.findall(text)) * (1.03 if "claude" in name else 1.0)
 
 
-@dataclass(frozen=True)
-class PictureRule:
-    """A provider's rule for picture tokens: `plus`, and `each` per square of `side` pixels.
-
-    The picture is first scaled down until its sides are at most `longest` and `shortest` [pixels].
-    At most `most` squares count. Providers that scale down to that number of squares count up to
-    5 % fewer.
-    """
-
-    plus: float = 0
-    each: float = 1
-    side: float = math.inf
-    longest: float = math.inf
-    shortest: float = math.inf
-    most: float = math.inf
-
-    def tokens(self, width: float, height: float) -> int:
-        """Return the tokens of a picture of this size [pixels]."""
-        scale = min(1.0, self.longest / max(width, height), self.shortest / min(width, height))
-        squares = math.ceil(width * scale / self.side) * math.ceil(height * scale / self.side)
-        return math.ceil(self.plus + self.each * min(self.most, squares))
-
-
 @functools.cache
-def _picture_rules() -> list[tuple[re.Pattern[str], dict[str, PictureRule]]]:
-    """Read pictures.yaml: for each pattern of names the rules by detail, "" for the default."""
-    rules = []
-    for entry in read_own_yaml(Path(__file__).with_name("pictures.yaml")):
-        by_name = {"": entry["usual"], **entry.get("details", {})}.items()
-        by_detail = {
-            name: PictureRule(**rule) if isinstance(rule, dict) else PictureRule(plus=rule)
-            for name, rule in by_name
-        }
-        rules.append((re.compile(rf"(^|\.){entry['model']}"), by_detail))
-    return rules
+def _picture_rules() -> list[tuple[re.Pattern[str], dict[str, Any]]]:
+    """Read pictures.yaml, which says what its rules mean, with each pattern of names."""
+    entries = read_own_yaml(Path(__file__).with_name("pictures.yaml"))
+    return [(re.compile(rf"(^|\.){entry['model']}"), entry) for entry in entries]
 
 
 def picture_tokens(model_id: str, image: Image, detail: ImageDetail | None = None) -> int:
@@ -382,5 +351,14 @@ def picture_tokens(model_id: str, image: Image, detail: ImageDetail | None = Non
     `model_id` may name any provider that serves the model.
     """
     name = model_id.rpartition("/")[2].lower()
-    rules = next(rules for names, rules in _picture_rules() if names.search(name))
-    return rules.get(detail or "auto", rules[""]).tokens(image.width_px, image.height_px)
+    entry = next(entry for names, entry in _picture_rules() if names.search(name))
+    rule = entry.get("details", {}).get(detail or "auto", entry["usual"])
+    if isinstance(rule, int):
+        return rule
+    width, height, side = image.width_px, image.height_px, rule["side"]
+    longest, shortest = rule.get("longest", math.inf), rule.get("shortest", math.inf)
+    scale = min(1.0, longest / max(width, height), shortest / min(width, height))
+    squares = math.ceil(width * scale / side) * math.ceil(height * scale / side)
+    most, each = rule.get("most", math.inf), rule.get("each", 1)
+    tokens: float = rule.get("plus", 0) + each * min(most, squares)
+    return math.ceil(tokens)

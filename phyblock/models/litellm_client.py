@@ -181,16 +181,15 @@ def _sender(config: ModelConfig) -> Any:
         def __init__(self) -> None:
             super().__init__(timeout=config.timeout_s)
             self.client = client
-            self._sdk: Any = None
+
+        @cached_property
+        def _sdk(self) -> Any:
+            return openai.AsyncOpenAI(api_key=api_key(config), base_url=config.api_base, **fields)
 
         def __getattr__(self, name: str) -> Any:
             if name.startswith("__"):
                 raise AttributeError(name)
-            known = self.__dict__
-            if known.get("_sdk") is None:
-                base, key = config.api_base, api_key(config)
-                known["_sdk"] = openai.AsyncOpenAI(api_key=key, base_url=base, **fields)
-            return getattr(known["_sdk"], name)
+            return getattr(self._sdk, name)
 
     return Sender()
 

@@ -324,13 +324,19 @@ class ChatModel:
         key = reply_key(self.config, request)
         if self.journal is not None and (answered := self.journal.kept(key)) is not None:
             return answered
-        if self.cache is None:
-            return await self._ask(request, key)
-        async with self.cache.shared(key):
-            if (kept := self.cache.get(key)) is not None:
+        cache, alone = self.cache, contextlib.nullcontext()
+        async with alone if cache is None else cache.shared(key):
+            if cache is not None and (kept := cache.get(key)) is not None:
                 return kept.model_copy(update={"cost_usd": cost_usd(self.budget.tariff, kept)})
-            reply = await self._ask(request, key)
-            self.cache.put(key, self.config.id, reply)
+            call = _Call(request, key, estimate(self.config, request))
+            retrying = self.policy.retrying(self.name, self.report)
+            try:
+                reply: Reply = await retrying(self._attempt, call)
+            except ModelError as error:
+                error.billed_usd = call.billed_usd
+                raise
+            if cache is not None:
+                cache.put(key, self.config.id, reply)
             return reply
 
     async def aclose(self) -> None:
@@ -338,21 +344,10 @@ class ChatModel:
         for server in self.servers.all:
             await server.client.aclose()
 
-    async def _ask(self, request: Request, key: str) -> Reply:
-        """Send until answered; however it ends, the billed cost is reported."""
-        call = _Call(request, key, estimate(self.config, request))
-        try:
-            return await self.policy.retrying(self.name, self.report)(self._attempt, call)
-        except ModelError as error:
-            error.billed_usd = call.billed_usd
-            raise
-
     async def _attempt(self, call: _Call) -> Reply:
         """Send once, when limits and budget have room."""
-        held, expected = None, call.expected
-        async with self.limits.slot(expected.most_tokens, call.failed_at) as server:
-            if self.budget.tariff is not None:
-                held = await self.budget.reserve(lambda: self.budget.most_usd(expected) or 0.0)
+        async with self.limits.slot(call.expected.most_tokens, call.failed_at) as server:
+            held = await self.budget.reserve(call.expected)
             exchange = asyncio.ensure_future(self._exchange(call, server, held))
             try:
                 return await asyncio.shield(exchange)
@@ -379,8 +374,14 @@ class ChatModel:
                 written = await self.journal.sent(self.name, sample, call.key, most_usd)
                 if call.is_cancelled:
                     raise asyncio.CancelledError
-            spent_usd = None
-            reply = await self._complete(call, server)
+            spent_usd, sent_s = None, self.policy.clock.now()
+            call.sent += 1
+            self.under_way += 1
+            try:
+                reply = await server.client.complete(call.request)
+            finally:
+                self.under_way -= 1
+            server.was_heard, server.failures = True, 0
             spent_usd = cost_usd(self.budget.tariff, reply)
             reply = reply.model_copy(update={"cost_usd": spent_usd, "attempts": call.sent})
             self.budget.learn(call.expected, reply.usage)
@@ -388,6 +389,8 @@ class ChatModel:
             if prompt is not None and completion is not None:
                 self.limits.release(call.expected.most_tokens - prompt - completion)
         except ModelError as error:
+            call.failed_at = server
+            self.servers.failed(server, error, sent_s)
             is_free = isinstance(error, UnavailableError) or not may_be_billed(error)
             spent_usd = 0.0 if is_free else None
             if is_free:
@@ -408,22 +411,6 @@ class ChatModel:
                 reply = reply.model_copy(update={"billed_usd": call.billed_usd})
             if self.journal is not None and written is not None:
                 await self.journal.ended(written, spent_usd, reply)
-        return reply
-
-    async def _complete(self, call: _Call, server: Server) -> Reply:
-        """Send to a server, and record whether it answers."""
-        sent_s = self.policy.clock.now()
-        call.sent += 1
-        self.under_way += 1
-        try:
-            reply = await server.client.complete(call.request)
-        except ModelError as error:
-            call.failed_at = server
-            self.servers.failed(server, error, sent_s)
-            raise
-        finally:
-            self.under_way -= 1
-        server.was_heard, server.failures = True, 0
         return reply
 
 

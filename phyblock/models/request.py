@@ -148,13 +148,10 @@ def wire_params(config: ModelConfig, request: Request) -> dict[str, Any]:
     return {name: value for name, value in merged.items() if value is not None}
 
 
-def json_body(
-    fields: Mapping[str, Any], messages: tuple[Message, ...], detail: ImageDetail | None
-) -> bytes:
+def json_body(fields: Mapping[str, Any], request: Request, detail: ImageDetail | None) -> bytes:
     """Return a request body. Pictures bypass the encoder: base64 has nothing to escape."""
-    parts = (part for message in messages for part in message.parts)
-    pictures = [part.data_uri for part in parts if isinstance(part, Image)]
-    body = {**fields, "messages": wire_messages(messages, detail, lambda _: _MARK)}
+    pictures = [image.data_uri for image in request.images]
+    body = {**fields, "messages": wire_messages(request.messages, detail, lambda _: _MARK)}
     first, *others = json.dumps(body, allow_nan=False).split(_MARK)
     return "".join((first, *itertools.chain(*zip(pictures, others, strict=True)))).encode()
 

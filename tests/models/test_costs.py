@@ -2,7 +2,6 @@
 
 import asyncio
 import contextlib
-import functools
 
 import pytest
 from hypothesis import given
@@ -128,19 +127,26 @@ def test_a_model_without_a_price_under_a_budget_is_an_error_at_the_start():
         build_model(config("openai/nobodys"), cache=None, budget=Budget(1.0))
 
 
+A_MILLIONTH = Tariff(input=0.0, output=1.0)
+"""The price of a token of a reply, so that a call costs any number of them."""
+
+
 @given(
     st.floats(0.1, 10),
-    st.lists(st.tuples(st.floats(0.01, 3), st.floats(0, 1), st.integers(0, 3)), max_size=30),
+    st.lists(
+        st.tuples(st.integers(10_000, 3_000_000), st.floats(0, 1), st.integers(0, 3)), max_size=30
+    ),
 )
 @in_a_loop
 async def test_a_budget_is_never_passed_and_stops_only_when_nothing_more_fits(limit, calls):
     budget = Budget(limit)
-    own = ModelBudget(budget)
+    own = ModelBudget(budget, A_MILLIONTH)
     refused = []
 
-    async def call(most, share, steps):
+    async def call(tokens, share, steps):
+        most = tokens / 1e6
         try:
-            held = await own.reserve(lambda: most)
+            held = await own.reserve(Estimate(0, 0, tokens))
         except BudgetReachedError:
             refused.append(most)
             assert budget.spent_usd + most > limit
@@ -177,7 +183,7 @@ async def test_a_call_costs_no_more_than_was_held_once_a_reply_like_it_has_come(
         async with room:
             known = (0, 0)
             try:
-                held = await own.reserve(lambda: own.most_usd(expected) or 0.0)
+                held = await own.reserve(expected)
             except BudgetReachedError:
                 return
             known, held_usd = longest, own.most_usd(expected) or 0.0
@@ -201,15 +207,15 @@ async def test_a_call_costs_no_more_than_was_held_once_a_reply_like_it_has_come(
 amounts = st.one_of(st.none(), st.floats(), st.floats(0, 2))
 
 
-@given(st.lists(st.tuples(st.floats(0.01, 2), amounts), max_size=30))
+@given(st.lists(st.tuples(st.integers(10_000, 2_000_000), amounts), max_size=30))
 @in_a_loop
 async def test_what_was_spent_never_becomes_less_and_an_unknown_cost_is_the_dearest(calls):
     budget = Budget(1000.0)
-    own = ModelBudget(budget)
-    for most, cost in calls:
-        before = budget.spent_usd
+    own = ModelBudget(budget, A_MILLIONTH)
+    for tokens, cost in calls:
+        before, most = budget.spent_usd, tokens / 1e6
         try:
-            held = await own.reserve(functools.partial(float, most))
+            held = await own.reserve(Estimate(0, 0, tokens))
         except BudgetReachedError:
             break
         counted = own.settle(held, cost)
