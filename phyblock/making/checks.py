@@ -151,7 +151,7 @@ def _overlap(facts: SceneFacts) -> Iterator[Finding]:
 
 
 def _floating(facts: SceneFacts) -> Iterator[Finding]:
-    """Blocks with a gap between them and what is below them."""
+    """Blocks with a gap below them."""
     for gap in find_gaps(facts.scene.blocks, facts.fit_m):
         message = f"block {gap.order} floats {gap.height_m * 1000:.2f} mm above its support"
         yield _fault(message, gap.order)

@@ -331,7 +331,7 @@ def verify_scenes(data: str, jobs: int) -> None:
 
     Checks contacts, layers, overlaps, gaps, stability of the whole at two time steps and of every
     step, candidates and duplicates. Overlaps and gaps of an official checkout may be 2 mm; all
-    other sets are also checked for sizes, hidden blocks, parents and checksums. Exits with 1 when
+    other sets are also checked for sizes, hidden blocks, parents and checksums. Exits with 1 if
     anything fails.
     """
     where = find_data_set(data)
@@ -547,7 +547,7 @@ def verify_questions(path: str, data: str, jobs: int) -> None:
     """Derive every answer of PATH again, from scene, pictures and simulator.
 
     PATH is a folder with questions.jsonl or a bundled set, by default the built-in phyblock-vqa.
-    Exits with 1 when an answer differs, a question is not fair, or a file has changed.
+    Exits with 1 if an answer differs, a question is not fair, or a file has changed.
     """
     read = _read(path, data)
     # Questions about one scene are processed together, so that pictures are shared.

@@ -286,7 +286,7 @@ class ExecutionLimits:
 class ExecutedStep:
     """Result of a step: the distance of the block at rest from its pose.
 
-    `gap_cm` is its height above what it would fall on, `overlap_cm` the distance by which it was
+    `gap_cm` is the gap to what is below its pose, `overlap_cm` the distance by which it was
     moved out of others or the floor, or the depth at which it was refused; `knocked` are the
     numbers of the steps whose blocks it moved, from 1.
     """

@@ -570,7 +570,7 @@ def ranks_of(fours: Floats) -> Ints:
 Place = tuple[float, float, float]
 """A point of the world [m]."""
 STAYS, IN_THE_WAY, TIPS = range(1, 4)
-"""Outcomes of setting a block down: it stays; it lands on a neighbor first, and tips off that; it
+"""Outcomes of setting a block down: it stays; it lands on a neighbor first and tips off that; it
 tips the block that it is set on."""
 _PLACE_RING_M, _WIDE_RING_M = 0.005, 0.01
 """Distances around a place at which its verdict holds, too: in answers and in proposals [m]."""
@@ -798,7 +798,7 @@ def four_of(
     """
     falls, tips = outcomes > STAYS, int((outcomes == TIPS).sum())
     if tips:
-        # At most as many points where something is in the way as where it tips.
+        # Keep at most as many points with something in the way as points that tip.
         falls[rng.permutation(np.flatnonzero(outcomes == IN_THE_WAY))[tips:]] = False
     fours = one_stays(outcomes == STAYS, falls, rng)
     pixels = np.array([mark_pixel(plain, at) for at in points.at_m.tolist()]).reshape(-1, 2)

@@ -337,7 +337,7 @@ _COUNTS, _TEXTS_TRIED = range(1, 11), 8
 class NumberMaker(StaticMaker):
     """NU: the number of blocks of a color, a shape, or both.
 
-    If color counts, four numbers and the right one of them are drawn, then blocks are colored.
+    If color counts, options and the right one are drawn first, and blocks colored accordingly.
     """
 
     subtask: Subtask = "NU"

@@ -117,7 +117,7 @@ def shares(picture: QuestionPicture) -> Mapping[int, float]:
 
 
 def _plain(picture: QuestionPicture) -> tuple[tuple[Block, ...], View]:
-    """Return the blocks, without facts that do not affect what is hidden, and the view."""
+    """Return the blocks, without facts that do not affect visibility, and the view."""
     blocks = tuple(replace(block, color="red", depend=()) for block in picture.blocks)
     return blocks, picture.view_deg
 

@@ -119,7 +119,7 @@ def _unlike(four: Sequence[Sequence[Block]], pixels: dict[int, int]) -> float:
 
 
 def _hits(four: Sequence[Sequence[Block]], first: dict[int, int], second: dict[int, int]) -> float:
-    """Return the number of colorings that the closest visible shares of colors find, rounded to a
+    """Return the number of colorings found by comparing the visible shares of colors, rounded to a
     thousandth; ties count in part.
     """
 
@@ -175,7 +175,7 @@ class OrderingMaker(Maker):
                     break
 
     def rederive(self, question: Question) -> tuple[int, ...]:
-        """Find the one order that follows from what rests on what."""
+        """Find the only order that the dependencies allow."""
         slots, scene = base.slots_of(question), question.scene
         options = sight.option_pictures(question)
         stages = [sight.highlighted(one, scene.blocks, slots) for one in options]
@@ -184,7 +184,7 @@ class OrderingMaker(Maker):
         sight.require_seen(options[0], sight.COUNTED)
         order = _only_order(scene, stages)
         if order is None:
-            raise UnfairError("what rests on what leaves more than one order, or none")
+            raise UnfairError("the dependencies allow more than one order, or none")
         return order if question.wording == "or-build" else order[::-1]
 
 
