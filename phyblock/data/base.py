@@ -56,10 +56,8 @@ class Dataset:
         if scene in self._by_scene:
             return self._by_scene[scene]
         allowed, hint = some_of(list(self._by_scene)), did_you_mean(scene, self._by_scene)
-        message = "is not in the data set"
-        raise DataError(
-            Problem(where or str(self.root), message, field, shown(scene), allowed, hint)
-        )
+        place, message = where or str(self.root), "is not in the data set"
+        raise DataError(Problem(place, message, field, shown(scene), allowed, hint))
 
 
 @dataclass(frozen=True)
@@ -91,9 +89,8 @@ class QuestionSet:
     @functools.cached_property
     def sha256(self) -> str:
         """Hex digest of the questions with their scenes and of the picture files' bytes."""
-        files = [sorted(task.files.items()) for task in self.tasks]
-        digests = [{name: hex_digest(read_data(path)) for name, path in own} for own in files]
-        return _digest([[t.question, own] for t, own in zip(self.tasks, digests, strict=True)])
+        files = [{n: hex_digest(read_data(p)) for n, p in t.files.items()} for t in self.tasks]
+        return _digest([[t.question, own] for t, own in zip(self.tasks, files, strict=True)])
 
 
 def _digest(content: object) -> str:

@@ -207,8 +207,7 @@ def _pictures_of(name: str, line: _Question, folder: Path, where: str) -> dict[s
         if path := next((path for path in paths if path.is_file()), None):
             files[label] = path
         elif label != "scene":
-            message, allowed = "the file is missing", str(paths[0])
-            raise DataError(Problem(where, message, "options", allowed=allowed))
+            raise DataError(Problem(where, "the file is missing", "options", allowed=str(paths[0])))
     return files
 
 
@@ -218,18 +217,16 @@ def _answer_of(line: _Question, subtask: Subtask, where: str) -> tuple[int, ...]
     parts = [line.answer] if isinstance(line.answer, str) else list(line.answer)
     if is_order and isinstance(line.answer, str):
         parts = [letter for letter in line.answer if letter.isalnum()]
-    answer: list[int] = []
-    for text in map(str.strip, parts):
-        letter = text.strip("().").upper()
-        if letter in tuple(LETTERS):
-            answer.append(LETTERS.index(letter))
-        elif text in line.options:
-            answer.append(line.options.index(text))
+    letters = {letter: n for n, letter in enumerate(LETTERS)}
+    options = {option: n for n, option in enumerate(line.options)}
+    texts = map(str.strip, parts)
+    found = [letters.get(text.strip("().").upper(), options.get(text)) for text in texts]
+    answer = tuple(n for n in found if n is not None)
     if not len(set(answer)) == len(parts) == (len(LETTERS) if is_order else 1):
         allowed = "all four letters or options" if is_order else "a letter or an option"
-        message, found = "is none of the options", shown(line.answer)
-        raise DataError(Problem(where, message, "answer", found, allowed))
-    return tuple(answer)
+        message = "is none of the options"
+        raise DataError(Problem(where, message, "answer", shown(line.answer), allowed))
+    return answer
 
 
 _TOKEN = re.compile(r"[a-z]+|[0-9]+|[^\W_]+")

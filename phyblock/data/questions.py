@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, StrictInt, TypeAdapter
 
-from phyblock.config.validation import BackgroundName, Fault, ShapeName, SubtaskName, checked
+from phyblock.config.validation import BackgroundName, Fault, SubtaskName, checked
 from phyblock.config.yaml import shown
 from phyblock.data.base import (
     Dataset,
@@ -30,6 +30,7 @@ from phyblock.data.scenes import (
     Name,
     Position,
     StoredBlock,
+    StoredKind,
     Text,
     View,
 )
@@ -48,7 +49,6 @@ from phyblock.records.record import Line, decode
 from phyblock.types import Background
 
 QUESTIONS_FILE = "questions.jsonl"
-_MOST_PICTURES = 2 + len(LETTERS)
 
 
 class StoredPose(Line, extra="ignore"):
@@ -58,15 +58,6 @@ class StoredPose(Line, extra="ignore"):
     """As for a block."""
     euler: Angles
     """As for a block."""
-
-
-class StoredKind(Line, extra="ignore"):
-    """The kind of a block in a picture."""
-
-    type: ShapeName
-    """Its shape."""
-    color: Color
-    """Its color."""
 
 
 class StoredMark(Line, extra="ignore"):
@@ -147,8 +138,7 @@ class StoredPicture(Line, extra="forbid"):
             yield from _unknown_orders(given, scene, field)
         taken = {block.order for block in scene.blocks} & {block.order for block in self.add}
         for order in sorted(taken):
-            message = "has the order of a block of the scene"
-            yield Fault(message, found=str(order), at=("add",))
+            yield Fault("has the order of a block of the scene", found=str(order), at=("add",))
         if not self.add and len(set(self.without)) == len(scene):
             yield Fault("draws no blocks", found="")
 
@@ -173,8 +163,7 @@ def _option_faults(options: Sequence[str]) -> Iterator[Fault]:
         yield Fault("are not the four pictures", " ".join(wanted))
 
 
-_FOUR = Field(min_length=len(LETTERS), max_length=len(LETTERS))
-Options = Annotated[tuple[Text, ...], _FOUR, checked(_option_faults)]
+Options = Annotated[tuple[Text, ...], Field(min_length=4, max_length=4), checked(_option_faults)]
 """Four different texts, or the four pictures in order."""
 
 
@@ -201,7 +190,7 @@ class StoredQuestion(Line, extra="forbid"):
     """Colors of recolored blocks, by order; missing: none."""
     background: BackgroundName | None = None
     """Background of all its pictures; missing: the run's own, as in older sets."""
-    pictures: Annotated[tuple[StoredPicture, ...], Field(min_length=1, max_length=_MOST_PICTURES)]
+    pictures: Annotated[tuple[StoredPicture, ...], Field(min_length=1, max_length=2 + len(LETTERS))]
     """Its pictures."""
     evidence: dict[str, Any] = Field(default_factory=dict)
     """Facts that the answer was derived from; `slots` are the words in the template."""
@@ -224,8 +213,7 @@ class StoredQuestion(Line, extra="forbid"):
 
     def about(self, original: Scene) -> Question:
         """Return the question about its scene, which is given as stored."""
-        colors = {block.order: self.colors.get(str(block.order)) for block in original.blocks}
-        blocks = (replace(b, color=colors[b.order] or b.color) for b in original.blocks)
+        blocks = (replace(b, color=self.colors.get(str(b.order), b.color)) for b in original.blocks)
         scene = replace(original, blocks=tuple(blocks))
         answer = tuple(map(LETTERS.index, self.answer))
         pictures = tuple(picture.picture(scene, self.background) for picture in self.pictures)
@@ -235,11 +223,12 @@ class StoredQuestion(Line, extra="forbid"):
     def faults(self, scene: Scene) -> Iterator[Fault]:
         """Yield its faults as a question about a scene."""
         if self.category not in (None, category_of(self.subtask)):
-            yield _wrong("category", "is not known", category_of(self.subtask), self.category)
+            known = category_of(self.subtask)
+            yield Fault("is not known", known, shown(self.category), ("category",))
         is_order = self.subtask == "OR"
         allowed = "all of A, B, C, D in the right order" if is_order else "A, B, C or D"
         if "".join(sorted(self.answer)) not in ([LETTERS] if is_order else [*LETTERS]):
-            yield _wrong("answer", "is none of the options", allowed, self.answer)
+            yield Fault("is none of the options", allowed, shown(self.answer), ("answer",))
         yield from _unknown_orders(self.colors, scene, "colors")
         for i, picture in enumerate(self.pictures):
             for each in picture.faults(scene):
@@ -252,16 +241,12 @@ class StoredQuestion(Line, extra="forbid"):
         missing, spare = sorted(wanted - set(labels)), sorted(set(LETTERS) & set(labels) - wanted)
         if missing or spare:
             what = "is missing for options" if missing else "is there for no option"
-            yield _wrong("pictures", f"a picture {what}", "", missing or spare)
+            yield Fault(f"a picture {what}", "", shown(missing or spare), ("pictures",))
         marked = {mark.letter for picture in self.pictures for mark in picture.marks}
         unmarked = sorted(set(LETTERS) - marked)
         if unmarked and list(self.options) == [f"place {letter}" for letter in LETTERS]:
             allowed = "marks A to D where the options are places"
-            yield _wrong("pictures", "no picture marks the places", allowed, unmarked)
-
-
-def _wrong(field: str, message: str, allowed: str, found: object) -> Fault:
-    return Fault(message, allowed, shown(found), (field,))
+            yield Fault("no picture marks the places", allowed, shown(unmarked), ("pictures",))
 
 
 def read_questions(folder: Path, scenes: Dataset) -> QuestionSet:

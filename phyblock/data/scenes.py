@@ -40,13 +40,10 @@ _UNSIGNED_ZERO = AfterValidator(lambda number: number + 0.0)
 # Whole numbers are easier to read in a file as integers.
 _PLAIN = PlainSerializer(lambda number: int(number) if number.is_integer() else number)
 # Bounds are far above any use, and small enough for exact geometry.
-_LENGTHS = Field(strict=True, ge=-100, le=100, allow_inf_nan=False)
-_ANGLES = Field(strict=True, ge=-36_000, le=36_000, allow_inf_nan=False)
-_ELEVATIONS = Field(strict=True, ge=1, le=90, allow_inf_nan=False)
-_Length = Annotated[float, _LENGTHS, _UNSIGNED_ZERO]
+_Length = Annotated[float, Field(strict=True, ge=-100, le=100), _UNSIGNED_ZERO]
 _Meters = Annotated[_Length, _PLAIN]
-_Degrees = Annotated[float, _ANGLES, _UNSIGNED_ZERO, _PLAIN]
-_Elevation = Annotated[float, _ELEVATIONS, _PLAIN]
+_Degrees = Annotated[float, Field(strict=True, ge=-36_000, le=36_000), _UNSIGNED_ZERO, _PLAIN]
+_Elevation = Annotated[float, Field(strict=True, ge=1, le=90), _PLAIN]
 Position = tuple[_Meters, _Meters, _Meters]
 """A point [m]."""
 Angles = tuple[_Degrees, _Degrees, _Degrees]
@@ -106,13 +103,18 @@ class SceneBlock(StoredBlock):
     """Origin of the body frame in the world [m], z up, the ground at z = 0."""
 
 
-class StoredCandidate(Line, extra="ignore"):
-    """A block of the dictionary shown to a model."""
+class StoredKind(Line, extra="ignore"):
+    """The kind of a block in a picture."""
 
     type: ShapeName
     """Its shape."""
     color: Color
     """Its color."""
+
+
+class StoredCandidate(StoredKind):
+    """A block of the dictionary shown to a model."""
+
     euler: Annotated[Angles, EITHER_NAME]
     """As for a block."""
     required: Any = None
@@ -235,14 +237,12 @@ def task_of(
     scene: Scene, candidates: CandidateSet, where: str, composite: Path | None = None
 ) -> AssemblyTask:
     """Return a scene with its candidates. Raises DataError for a block without a candidate."""
-    missing = candidates.missing(scene)
     allowed = "every type, color and orientation that the scene uses"
     faults = []
-    for block in scene.blocks:
-        if block.order in missing:
-            message = f"hold nothing that block {block.order} of scene {scene.id} needs"
-            found = shown([block.type, block.color, block.euler_deg])
-            faults.append(Fault(message, allowed, found, ("candidates",)))
+    for block in (one for one in scene.blocks if candidates.index_of(one.look) is None):
+        message = f"hold nothing that block {block.order} of scene {scene.id} needs"
+        found = shown([block.type, block.color, block.euler_deg])
+        faults.append(Fault(message, allowed, found, ("candidates",)))
     report(faults, where)
     return AssemblyTask(scene, candidates, composite)
 
