@@ -135,7 +135,10 @@ def judged(record):
 @pytest.mark.parametrize("track", TRACKS)
 def test_a_reply_is_worth_what_it_is_in_a_run(track, tmp_path):
     folder = tmp_path / "run"
-    phyblock.run_suite(TRACKS[track], models=["random"], limit=4, out=folder)
+    run = phyblock.run_suite(TRACKS[track], models=["random"], limit=4, out=folder)
+    assert all(isinstance(name, str) for held in run.counts.values() for name in held)
+    if track == "full_planning":
+        assert {"tp", "fp", "fn"} < {*run.counts[track, "steps"]}
     records = [one for _, one in run_records(folder, read_manifest(folder))]
     for seed, of_seed in itertools.groupby(records, lambda one: one.seed):
         found = phyblock.tasks(track, seed=seed, limit=4)

@@ -151,6 +151,9 @@ def run(
     gc.freeze()
     if result.left or not (is_as_it_was and _is_newest(folder, made)):
         show_tables(folder, page=not no_report)
+    else:
+        again = f"Nothing is new; the tables: phyblock report {shown_path(folder)} --print"
+        console.print(one_line(again), style="dim", soft_wrap=True)
     code = _conclude(console, folder, result, view)
     print_path(console, made)
     return code

@@ -100,8 +100,14 @@ def frames_of(
     # Replaced records have no row.
     row_of = pd.Series(range(len(frame)), index=frame.index)
     counts = {}
+    named = {
+        (track, measure.counted.name): measure.counted.columns
+        for track in taken
+        for measure in track_measures(track)
+    }
     for key, rows in ((key, rows) for key, rows in numbers.items() if rows):
-        held = pd.DataFrame(rows).rename(columns=dict(enumerate(("row", *SCORED_BY))))
+        names = enumerate(("row", *SCORED_BY, *named.get(key, ())))
+        held = pd.DataFrame(rows).rename(columns=dict(names))
         held["row"] = held["row"].map(row_of)
         held = held.dropna(subset="row").astype({"row": "intp"})
         counts[key] = held.sort_values("row", kind="stable", ignore_index=True)

@@ -136,11 +136,15 @@ def entries_of(runs: Sequence[SiteRun]) -> tuple[Entry, ...]:
                 found.append((fields, entry))
             entry.runs |= dict.fromkeys(one.tracks, number)
     entries = tuple(entry for _, entry in found)
-    names = [entry.model.name for entry in entries]
     for entry in entries:
-        entry.name, begun = entry.model.name, runs[min(entry.runs.values())].run.manifest
-        if names.count(entry.name) > 1:
-            entry.name += f" ({begun.created[:10]}, run {begun.identity[:8]})"
+        entry.name = entry.model.name
+    # By the date of their run, and by its time where that is not enough.
+    for length in (len("2026-11-22"), len("2026-11-22T12:00:00")):
+        names = [entry.name for entry in entries]
+        for entry in (one for one in entries if names.count(one.name) > 1):
+            begun = runs[min(entry.runs.values())].run.manifest
+            when = f"{begun.created[:length]}, run {begun.run[:8]}"
+            entry.name = f"{entry.model.name} ({when})"
     return entries
 
 
@@ -291,6 +295,7 @@ def _run(one: SiteRun) -> dict[str, Any]:
     words = [word for track in one.tracks for word in run.presentation(track)]
     return {
         "suite": run.design.suite.name,
+        "limit": run.manifest.limit,
         "id": manifest.identity[:12],
         "date": manifest.created[:10],  # UTC
         "verified": one.unverified is not None,

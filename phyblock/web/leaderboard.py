@@ -99,7 +99,7 @@ def open_runs(paths: Sequence[Path], data: Sequence[Path], kept: ExitStack) -> t
     not verify, and DataError for a bundle whose data are not found.
     """
     opened: list[SiteRun] = []
-    seen: dict[str, str] = {}
+    seen: dict[tuple[str, str], str] = {}
     for path in paths:
         where, unverified = str(path), None
         if path.is_file():
@@ -108,11 +108,12 @@ def open_runs(paths: Sequence[Path], data: Sequence[Path], kept: ExitStack) -> t
             run = load_run(verified.folder)
         else:
             run = load_run(path)
-        identity = run.manifest.identity
-        if identity in seen:
-            message = f"is the same run as {seen[identity]}"
-            raise SpecError(Problem(where, message, "identity", identity[:16], hint="give it once"))
-        seen[identity] = where
+        # Runs of other models may have the same identity; a run and its bundle began together.
+        begun = run.manifest.run, run.manifest.created
+        if begun in seen:
+            message, found = f"is the same run as {seen[begun]}", " of ".join(begun)
+            raise SpecError(Problem(where, message, "identity", found, hint="give it once"))
+        seen[begun] = where
         sources = open_sources(run, None)
         for folder in data:
             if sources.lacking:
@@ -134,9 +135,12 @@ def check_runs(runs: Sequence[SiteRun]) -> None:
         for first in runs[:number]:
             shared = [track for track in one.tracks if track in first.tracks]
             found, wanted = (_facts(side.run, shared) for side in (one, first))
-            message = f"cannot share a table with {first.where}"
+            message, hint = f"cannot share a table with {first.where}", "make a site of each"
+            limits = [side.run.manifest.limit or "none" for side in (one, first)]
+            if limits[0] != limits[1]:
+                hint += f"; their limits are {limits[0]} and {limits[1]} (--limit)"
             differences = [
-                Problem(one.where, message, name, str(value), str(other), "make a site of each")
+                Problem(one.where, message, name, str(value), str(other), hint)
                 for name, value in found.items()
                 # The prompt of a recording is unknown, and a baseline has none.
                 if None not in (value, other := wanted.get(name)) and value != other

@@ -4,6 +4,7 @@ import base64
 import json
 import math
 import re
+import shutil
 import zlib
 from bisect import bisect_right
 
@@ -252,6 +253,10 @@ def test_a_model_asked_different_things_is_one_row_and_the_same_things_two():
     names = [entry.name for entry in entries_of([plan, later])]
     assert names[::2] == ["alpha (2026-11-22, run 00000000)", "alpha (2026-11-23, run 11111111)"]
     assert len(set(names)) == len(names)
+    evening = site_run("y", created="2026-11-22T20:00:00+00:00")
+    names = [entry.name for entry in entries_of([plan, evening])]
+    assert names[0] == "alpha (2026-11-22T10:00:00, run 00000000)"
+    assert len(set(names)) == len(names)
 
 
 def shown(images, digest):
@@ -324,3 +329,15 @@ def test_a_build_that_was_stopped_never_looks_whole_and_what_is_not_ours_stays(
 def test_a_run_given_twice_is_refused(made, tmp_path):
     with pytest.raises(SpecError, match="is the same run as"):
         write_site([made.root / "later", made.root / "later.zip"], tmp_path / "s", data_of(made))
+
+
+def test_two_people_who_ran_one_suite_share_a_leaderboard(made, tmp_path):
+    """Models and seeds are not part of a run's identity, so theirs are equal."""
+    other = tmp_path / "other"
+    shutil.copytree(made.root / "later", other)
+    began = load_run(other).manifest.created
+    text = (other / "run.yaml").read_text(encoding="utf-8")
+    (other / "run.yaml").write_text(text.replace(began, "2026-11-22T10:00:00+00:00"), "utf-8")
+    site = write_site([made.root / "later", other], tmp_path / "s", data_of(made))
+    one = write_site([other], tmp_path / "one", data_of(made))
+    assert (site.models, site.samples) == (2 * one.models, 2 * one.samples)

@@ -120,7 +120,7 @@ const Results = (() => {
     const samples = rows.flatMap((row) => Object.values(row.facts)).reduce((sum, fact) => sum + fact.recorded, 0);
     const dates = [...new Set(runs.map((run) => run.date).filter(Boolean).sort())];
     const verified = runs.filter((run) => run.verified).length, suite = runs[0].suite || "full", isOfficial = runs[0].data === "official";
-    const where = isOfficial ? " --set dataset.path=FOLDER   # a checkout of the official repository" : "";
+    const where = (runs[0].limit ? ` --limit ${runs[0].limit}` : "") + (isOfficial ? " --set dataset.path=FOLDER   # a checkout of the official repository" : "");
     const said = [Words.count(rows.filter(Data.isModel).length, "model"), Words.count(samples, "sample"),
       isOfficial ? "official data" : runs[0].data && `data ${runs[0].data}, version ${runs[0].version}`, [...new Set([dates[0], dates.at(-1)])].filter(Boolean).join(" to ")];
     return [el("section", { class: "method" }, el("h2", {}, "Method"),
