@@ -151,10 +151,12 @@ def run(
     gc.freeze()
     if result.left or not (is_as_it_was and _is_newest(folder, made)):
         show_tables(folder, page=not no_report)
+        hint = ""
     else:
-        again = f"Nothing is new; the tables: phyblock report {shown_path(folder)} --print"
-        console.print(one_line(again), style="dim", soft_wrap=True)
+        hint = f"phyblock report {shown_path(folder)} --print shows its tables."
     code = _conclude(console, folder, result, view)
+    if hint:
+        console.print(one_line(hint), style="dim", soft_wrap=True)
     print_path(console, made)
     return code
 

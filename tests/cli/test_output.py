@@ -134,7 +134,8 @@ def test_the_folder_of_a_run_is_found_again_without_naming_it(suite):
     assert first.out.splitlines()[-1] == f"results/{folder.name}/report.html"
     before = suite.files()
     again = suite.phyblock("run", "suite.yaml").out.splitlines()
-    assert again == first.out.splitlines()[-2:]
+    done, path = first.out.splitlines()[-2:]
+    assert again == [done, f"phyblock report results/{folder.name} --print shows its tables.", path]
     assert suite.files() == before
 
 
