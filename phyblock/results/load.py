@@ -80,12 +80,14 @@ def frames_of(
     found: list[tuple[Any, ...]] = []
     numbers: dict[tuple[str, str], list[tuple[Any, ...]]] = {}
     taken: dict[str, list[SampleCounts]] = {}
+    named: dict[tuple[str, str], Sequence[str]] = {}
     for owner, (record, start) in enumerate(records):
         found.append(_row(record, start))
         track = record.track
         if track not in taken:
             known = dict.fromkeys(measure.counted for measure in track_measures(track))
             taken[track] = [counted for counted in known if counted.sample is None]
+            named |= {(track, counted.name): counted.columns for counted in known}
         for counted in taken[track]:
             rows = numbers.setdefault((track, counted.name), [])
             rows += [(owner, *way, *of_way) for way, of_way in counted.of(record)]
@@ -100,11 +102,6 @@ def frames_of(
     # Replaced records have no row.
     row_of = pd.Series(range(len(frame)), index=frame.index)
     counts = {}
-    named = {
-        (track, measure.counted.name): measure.counted.columns
-        for track in taken
-        for measure in track_measures(track)
-    }
     for key, rows in ((key, rows) for key, rows in numbers.items() if rows):
         names = enumerate(("row", *SCORED_BY, *named.get(key, ())))
         held = pd.DataFrame(rows).rename(columns=dict(names))

@@ -355,14 +355,11 @@ def blind_sentence(run: Run, track: str) -> str:
     if (floor := headline.floor) is None:
         return ""
     named, better = f"{floor.name} ({number(floor.value)})", headline.measure.better
-    above = [
-        floor.is_below(value, better)
-        for model, value in headline.ranked.items()
-        if model not in run.design.baselines
-    ]
-    verb = "is" if len(above) == 1 else "are"
-    text = f"{sum(above)} of {counted(len(above), 'model')} {verb} shown to be above {named}"
-    if not above:
+    models = [v for name, v in headline.ranked.items() if name not in run.design.baselines]
+    above = sum(floor.is_below(value, better) for value in models)
+    verb = "is" if len(models) == 1 else "are"
+    text = f"{above} of {counted(len(models), 'model')} {verb} shown to be above {named}"
+    if not models:
         text = f"The strongest baseline here that never sees the goal is {named}"
     title = f"{kind_of(track).title}: " if len(run.design.suite.tracks) > 1 else ""
     return f"{title}{text}."

@@ -121,7 +121,7 @@ def entries_of(runs: Sequence[SiteRun]) -> tuple[Entry, ...]:
     """Return every model of every run.
 
     The same model with the same parameters, asked by two runs in different tracks, is one row. If
-    runs asked it in the same track, it has a row for each, with the date and identity of the run.
+    runs asked it in the same track, it has a row for each, with the time and identity of the run.
     """
     found: list[tuple[dict[str, Any], Entry]] = []
     for number, one in enumerate(runs):
@@ -136,15 +136,11 @@ def entries_of(runs: Sequence[SiteRun]) -> tuple[Entry, ...]:
                 found.append((fields, entry))
             entry.runs |= dict.fromkeys(one.tracks, number)
     entries = tuple(entry for _, entry in found)
+    names = [entry.model.name for entry in entries]
     for entry in entries:
-        entry.name = entry.model.name
-    # By the date of their run, and by its time where that is not enough.
-    for length in (len("2026-11-22"), len("2026-11-22T12:00:00")):
-        names = [entry.name for entry in entries]
-        for entry in (one for one in entries if names.count(one.name) > 1):
-            begun = runs[min(entry.runs.values())].run.manifest
-            when = f"{begun.created[:length]}, run {begun.run[:8]}"
-            entry.name = f"{entry.model.name} ({when})"
+        entry.name, begun = entry.model.name, runs[min(entry.runs.values())].run.manifest
+        if names.count(entry.name) > 1:
+            entry.name += f" ({begun.created[:19].replace('T', ' ')}, run {begun.run[:8]})"
     return entries
 
 

@@ -111,8 +111,8 @@ def open_runs(paths: Sequence[Path], data: Sequence[Path], kept: ExitStack) -> t
         # Runs of other models may have the same identity; a run and its bundle began together.
         begun = run.manifest.run, run.manifest.created
         if begun in seen:
-            message, found = f"is the same run as {seen[begun]}", " of ".join(begun)
-            raise SpecError(Problem(where, message, "identity", found, hint="give it once"))
+            message = f"is the same run as {seen[begun]}"
+            raise SpecError(Problem(where, message, "identity", begun[0], hint="give it once"))
         seen[begun] = where
         sources = open_sources(run, None)
         for folder in data:
@@ -136,14 +136,13 @@ def check_runs(runs: Sequence[SiteRun]) -> None:
             shared = [track for track in one.tracks if track in first.tracks]
             found, wanted = (_facts(side.run, shared) for side in (one, first))
             message, hint = f"cannot share a table with {first.where}", "make a site of each"
-            limits = [side.run.manifest.limit or "none" for side in (one, first)]
-            if limits[0] != limits[1]:
-                hint += f"; their limits are {limits[0]} and {limits[1]} (--limit)"
+            if (limit := one.run.manifest.limit) != (other := first.run.manifest.limit):
+                hint += f"; their limits (--limit) are {limit or 'none'} and {other or 'none'}"
             differences = [
-                Problem(one.where, message, name, str(value), str(other), hint)
+                Problem(one.where, message, name, str(value), str(was), hint)
                 for name, value in found.items()
                 # The prompt of a recording is unknown, and a baseline has none.
-                if None not in (value, other := wanted.get(name)) and value != other
+                if None not in (value, was := wanted.get(name)) and value != was
             ]
             problems += differences
             if differences:

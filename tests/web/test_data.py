@@ -249,14 +249,12 @@ def test_a_model_asked_different_things_is_one_row_and_the_same_things_two():
     one = entries_of([plan, vqa])
     assert [entry.name for entry in one] == ["alpha", "beta"]
     assert one[0].runs == {"full_planning": 0, "vqa": 1}
-    later = site_run("x", created="2026-11-23", identity="1" * 64)
-    names = [entry.name for entry in entries_of([plan, later])]
-    assert names[::2] == ["alpha (2026-11-22, run 00000000)", "alpha (2026-11-23, run 11111111)"]
-    assert len(set(names)) == len(names)
-    evening = site_run("y", created="2026-11-22T20:00:00+00:00")
-    names = [entry.name for entry in entries_of([plan, evening])]
-    assert names[0] == "alpha (2026-11-22T10:00:00, run 00000000)"
-    assert len(set(names)) == len(names)
+    for hour, digit in ((20, "0"), (10, "1")):
+        later = site_run("x", created=f"2026-11-22T{hour}:00:00+00:00", identity=digit * 64)
+        names = [entry.name for entry in entries_of([plan, later])]
+        assert names[0] == "alpha (2026-11-22 10:00:00, run 00000000)"
+        assert names[2] == f"alpha (2026-11-22 {hour}:00:00, run {digit * 8})"
+        assert len(set(names)) == len(names)
 
 
 def shown(images, digest):
