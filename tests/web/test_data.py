@@ -292,6 +292,14 @@ def test_runs_that_differ_in_what_decides_are_refused_with_what_differs(change, 
     assert (problem.where, problem.field) == ("two", field)
 
 
+def test_runs_of_different_limits_are_told_so():
+    limits = {"a": 4, "b": None}
+    runs = [site_run(name, limit=n, **of_data(sha256=name)) for name, n in limits.items()]
+    with pytest.raises(SpecError, match=r"their limits \(--limit\) are none and 4"):
+        check_runs(runs)
+    assert [one["limit"] for one in board_of(runs, entries_of(runs))["runs"]] == [4, None]
+
+
 def test_a_recording_and_a_larger_picture_stand_beside_any_other():
     first, larger = site_run("one"), site_run("two", **shown({"size_px": 512}, "b"))
     check_runs([site_run("one", **shown({}, "a")), larger])
