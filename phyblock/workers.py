@@ -151,12 +151,15 @@ class _SharedBatch:
             except BlockingIOError:
                 lock.close()
                 return
-        if self.path.exists():
-            lock.close()
-        else:
-            self.started = self.job(self.path)
-            # Released before the answers are needed, or two shards could wait for one another.
-            self.started.add_done_callback(lambda _: lock.close())
+        try:
+            if not self.path.exists():
+                self.started = self.job(self.path)
+        finally:
+            if self.started is None:
+                lock.close()
+            else:
+                # Released before the answers are needed, or two shards could wait for one another.
+                self.started.add_done_callback(lambda _: lock.close())
 
     def result(self) -> Any:
         """Return the answers."""

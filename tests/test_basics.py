@@ -173,6 +173,18 @@ def test_a_shard_computes_what_a_killed_one_has_begun(tmp_path):
         assert list(workers.map(partial(killed_once, marks), range(40))) == list(range(40))
 
 
+def test_a_batch_that_could_not_be_started_can_be_computed_by_another_shard(tmp_path):
+    def broken(path):
+        raise PhyblockError(f"no worker for {path.name}")
+
+    # The error that is kept holds the frames that began, and with them what they have open.
+    with pytest.raises(PhyblockError) as kept:
+        Shards(tmp_path / "shards", 1, 1, "work").batch(0, 0, broken)
+    with open_workers(shards=Shards(tmp_path / "shards", 1, 1, "work")) as workers:
+        assert list(workers.map(str, range(3))) == ["0", "1", "2"]
+    assert "0000-000000.pickle" in str(kept.value)
+
+
 def killed_once(marks, number):
     """Return the number, but kill the process of the first call with 37."""
     if number == 37 and not list(marks.iterdir()):
