@@ -5,7 +5,9 @@
 The server speaks the OpenAI chat protocol, answers after the given latency, and runs as a process
 of its own; every call carries a picture of about 150 KB. All figures come from one run of this
 script: wall time, CPU time and peak memory of the whole process tree, pictures rendered and modules
-compiled before, as an installation compiles them.
+compiled before, as an installation compiles them. The bare loops only call; a run also judges,
+records, and writes tables and the report. Two baselines beside the model, as in runs by default,
+are two samples more for each call: a line of its own.
 """
 
 from __future__ import annotations
@@ -36,6 +38,7 @@ def write_suite(folder: Path, transport: str, api_base: str, calls: int, concurr
         "seeds": list(range(calls // scenes)),
         "images": {"size_px": SIZE_PX},
         "limits": {"max_concurrency": concurrency},
+        "baselines": [],
     }
     model = {"id": "openai/bench", "api_base": api_base, "transport": transport}
     target = folder / transport
@@ -110,6 +113,11 @@ def compare(folder: Path, api_base: str, options: argparse.Namespace) -> None:
     show("phyblock run again, from the cache", warm, ideal_s, loops)
     done = phyblock(suites["litellm"], folder / "warm", env)
     show("phyblock run again, all done", done, ideal_s, loops)
+    more = ["--set", "baselines=[goal-blind, random]"]
+    (folder / "cache" / "replies.sqlite").unlink()
+    for name in ("direct", "from the cache"):
+        beside = phyblock(suites["direct"], folder / f"baselines {name}", env, *more)
+        show(f"{name}, and two baselines", beside, ideal_s, loops)
     helped = run_measured([sys.executable, "-m", "phyblock", "--help"], env)
     show("phyblock --help", helped, ideal_s, loops)
 
