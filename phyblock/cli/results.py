@@ -30,7 +30,6 @@ from phyblock.text import counted, one_line, some_of
 if TYPE_CHECKING:
     from phyblock.records.record import Record
 
-_MB = 1e6
 _FAILURES = 4
 """Maximum number of messages of failed calls that are shown."""
 
@@ -149,7 +148,8 @@ def show(run: Path, sample: str, data: Path | None) -> None:
         task = as_recorded(dataset.task(record.scene), record)
         blocks = enumerate(task.candidates.candidates, 1)
         names = ", ".join(f"{n} {one.color} {one.type}" for n, one in blocks)
-        console.print(f"Candidates: {names}\n", style="dim")
+        needed = ", ".join(str(task.candidates.index_of(b.look)) for b in task.scene.blocks)
+        console.print(f"Candidates: {names}\nGoal: {needed}\n", style="dim")
     except DataError as error:
         console.print(f"Names of blocks are not shown: {error}\n", style="dim")
     heading = known_track(record.track).report().heading
@@ -270,7 +270,7 @@ def bundle(run: Path, out: Path | None) -> None:
 
     console = make_console()
     path = bundle_run(run, out)
-    console.print(f"{path.stat().st_size / _MB:.2f} MB:")
+    console.print(f"{path.stat().st_size / 1000:,.0f} kB:")
     print_path(console, path)
 
 

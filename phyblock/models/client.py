@@ -369,7 +369,7 @@ class HttpClient:
                     response.close()
                 return Answer(response.status, response.headers, content, fault)
         except (aiohttp.ConnectionTimeoutError, aiohttp.ClientConnectorError) as error:
-            said = f"no connection to {host}: {error or 'not in time'}"
+            said = f"no connection to {host}: {getattr(error, 'os_error', error)}"
             raise RetryableError(said, sent="no") from None
         except TimeoutError:
             within = f"no whole answer within {self._timeout_s:g} s"
