@@ -47,6 +47,7 @@ SUITES: dict[str, dict[str, Any]] = {
     "plans": {},
     "plans-separate": {"images": {**_SHOWN, "layout": "separate", "order": ["candidates", "goal"]}},
     "plans-json": {"answer_format": "json_schema"},
+    "plans-blind": {"full_planning": {"blind": True}},
     "plans-shuffled": {"candidates": {"order": "shuffled"}, "seeds": [0, 1]},
     "plans-varied": {"vary": {"view": ["oblique", "front"], "layout": ["composite", "separate"]}},
     "steps": {"tracks": ["step_planning"]},

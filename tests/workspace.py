@@ -253,7 +253,7 @@ class Workspace:
         names = names or ("alpha",)
         with Running(server) as running:
             self.write_models(running.url, *names, **(entry or {}))
-            self.write_suite(models=list(names), **suite)
+            self.write_suite(**{**suite, "models": list(names)})
             yield server
 
     def copied(self, root: Path) -> Workspace:

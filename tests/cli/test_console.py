@@ -99,25 +99,24 @@ def test_no_cell_of_any_csv_is_a_formula(tmp_path):
     assert pd.read_csv(exported[0])["reply"][0] == "'-2+3+cmd|' /C calc'!A0"
 
 
-def retry(status=429, wait_s=1.0, model="alpha"):
-    text = f"HTTP {status}: busy" if status else "no connection to host"
-    return ModelEvent(model, "retry", text, wait_s)
+def retry(wait_s=1.0):
+    return ModelEvent("alpha", "retry", "HTTP 429: busy", wait_s)
 
 
-def done(model="alpha", outcome="ok"):
-    line = known_records().validate_python(record(model=model, outcome=outcome))
+def failed():
+    line = known_records().validate_python(record(model="alpha", outcome="api_error"))
     return SampleDone(Summary.of(line))
 
 
-def logged(*events, models=("alpha",), expected=10):
-    """The lines that a log gets, each event at its time [s]; None is a tick of the clock."""
+def logged(*events):
+    """The lines that a log gets, each event at its time [s]."""
     now_s = 0.0
     screen = io.StringIO()
     with ProgressView(Console(file=screen, width=160), lambda: now_s) as view:
-        view(RunStarted(expected, dict.fromkeys(models, ())))
+        view(RunStarted(10, {"alpha": ()}))
         for at_s, event in events:
             now_s = at_s
-            view.tick() if event is None else view(event)
+            view(event)
     return screen.getvalue().splitlines()
 
 
@@ -125,8 +124,8 @@ def test_a_log_tells_of_retries_servers_failures_and_models_that_are_stopped():
     lines = logged(
         (0.0, retry()),
         (1.0, ModelEvent("", "notice", "http://host:1 cannot be reached [x] :b: no connection")),
-        (2.0, retry(None, 9.0)),
-        (11.0, done(outcome="api_error")),
+        (2.0, retry(9.0)),
+        (11.0, failed()),
         (12.0, ModelEvent("alpha", "stopped", "HTTP 401: no")),
         (21.5, retry()),
     )
@@ -137,9 +136,3 @@ def test_a_log_tells_of_retries_servers_failures_and_models_that_are_stopped():
         "alpha stopped: HTTP 401: no",
         "1 of 1 sample after 22 s, 1 api error, 3 sent again",
     ]
-
-
-def test_until_anything_is_asked_scenes_are_being_prepared():
-    lines = logged((12, None), (20, done()), (31, None))
-    assert lines[0] == "Preparing scenes ... (12 s)"
-    assert lines[-1].startswith("1 of 10 samples after 31 s")

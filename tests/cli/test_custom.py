@@ -2,43 +2,16 @@
 
 import pytest
 
-from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
 
 
-@pytest.fixture
-def asked(workspace):
-    workspace.write_suite(models=["alpha"], seeds=[0])
+def test_a_prompt_beside_the_suite_is_used(workspace):
     (workspace.root / "prompts").mkdir()
-    return workspace
-
-
-def own_prompt(workspace):
-    return workspace.root / "prompts" / "full_planning.j2"
-
-
-def test_a_prompt_beside_the_suite_is_used(asked):
     text = "{% block user %}Which of the {{ n_candidates }}?{% endblock %}"
-    own_prompt(asked).write_text(text, encoding="utf-8")
-    with Running(OpenAIChat()) as running:
-        asked.write_models(running.url, "alpha")
-        done = asked.run()
-        texts = {part for seen in running.server.seen for part in seen.parts if part[0] == "W"}
-    assert done.code == 0, done.err
-    assert texts == {"Which of the 16?"}
-
-
-@pytest.mark.parametrize("verb", ["validate", "run"])
-def test_a_prompt_is_rendered_before_anything_is_asked(asked, verb):
-    asked.write_models("http://127.0.0.1:9", "alpha")
-    # Of another track, which has turns.
-    text = "{% block user %}a{% endblock %}{% block turn %}b{% endblock %}"
-    own_prompt(asked).write_text(text, encoding="utf-8")
-    done = asked.phyblock(verb, "suite.yaml")
-    assert done.code == 2
-    assert "full_planning.j2" in done.err
-    assert "that nothing uses" in done.err
-    assert not (asked.root / "results").exists()
+    (workspace.root / "prompts" / "full_planning.j2").write_text(text, encoding="utf-8")
+    with workspace.served(OpenAIChat()) as server:
+        workspace.completed()
+    assert {seen.parts[-1] for seen in server.seen} == {"Which of the 16?"}
 
 
 @pytest.mark.parametrize("suite", ["quick", "steps", "vqa", "sensitivity"])

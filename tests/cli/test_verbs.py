@@ -12,7 +12,6 @@ from click.testing import CliRunner
 from phyblock.cli.main import phyblock
 from phyblock.config.models import ModelConfig
 from phyblock.data.scenes import read_builtin
-from phyblock.errors import SpecError, StoreError
 from phyblock.models import litellm_client
 from phyblock.models.cache import ReplyCache
 from phyblock.models.litellm_client import known_providers
@@ -61,15 +60,11 @@ def test_importing_what_a_program_needs_imports_nothing_heavy(modules, heavy):
 
 def test_help_and_version_import_nothing_heavy():
     told, imported = ran(COMMANDS, "--help")
-    for verb in VERBS:
-        assert f"\n  {verb} " in told
-    assert "phyblock run quick" in told
+    assert all(f"\n  {verb} " in told for verb in VERBS)
     assert not imported & {*HEAVY, "numpy", "pydantic", "rich", "yaml"}
     verbs = ("run", "report", "score", "validate", "models", "cache", "init")
     told, imported = ran(COMMANDS, "--version", *(f"{verb} --help" for verb in verbs))
-    assert told.startswith("phyblock, version ")
-    for verb in verbs:
-        assert f"Usage: phyblock {verb} " in told
+    assert told.count("Usage: phyblock ") == len(verbs)
     assert not imported & set(HEAVY)
 
 
@@ -137,17 +132,11 @@ def played(new_workspace):
     return workspace
 
 
-def test_an_episode_is_shown_step_by_step(played):
+def test_an_episode_is_told_by_the_outcome_of_each_step_and_its_end(played):
     endings = {r["seed"]: r["ending"] for r in played.records() if r["model"] == "oracle"}
     assert set(endings.values()) == {"completed", "collapsed"}
     fallen = next(seed for seed, ending in endings.items() if ending == "collapsed")
-    done = played.does("show", "out", f"oracle/seesaw/s{fallen}")
-    assert done.out.rstrip().endswith("placed; ended: Collapsed")
-    assert "2. block 3: right" in done.out.splitlines()
-    assert "3 yellow cuboid3" in done.out
-
-
-def test_an_episode_is_told_by_the_outcome_of_each_step_and_its_end(played):
+    assert "Collapsed" in played.does("show", "out", f"oracle/seesaw/s{fallen}").out
     (task,) = read_builtin(played.root / "data").tasks
     for episode in read_records(played.root / "out"):
         course, built = episode.course(""), episode.built(task)
@@ -158,29 +147,21 @@ def test_an_episode_is_told_by_the_outcome_of_each_step_and_its_end(played):
         assert set(built) <= set(task.scene.blocks)
 
 
-def test_a_plan_is_shown_from_its_prompt_to_its_verdicts(workspace):
-    with workspace.served(OpenAIChat()):
-        workspace.completed()
-    shown = next(one for one in workspace.records() if one["scene"] == "t3")
-    done = workspace.does("show", "out", "alpha/t3", env={"COLUMNS": "80"})
-    assert max(map(len, done.out.splitlines())) <= 80
-    parts = ("\nPrompt (", "\nReply\n", "\nRead\n", "\n1. block ", " blocks placed\n")
-    order = [done.out.index(text) for text in parts]
-    assert order == sorted(order)
-    assert shown["reply"]["text"].splitlines()[0] in done.out
-    assert " ".join(map(str, shown["parse"]["plan"])) in done.out
-    steps = re.findall(r"^\d+\. block (\d+): ", done.out, re.MULTILINE)
-    assert steps == [str(candidate) for candidate in shown["parse"]["plan"]]
-
-
-def test_an_answer_is_shown_with_the_right_one(workspace):
+def test_plans_and_answers_are_shown_with_reply_steps_and_verdict(workspace):
     write_questions(workspace.root / "questions", questions(per_subtask=2, subtasks=("SH", "CO")))
-    workspace.write_suite(**vqa_suite())
-    workspace.completed("--models", "random")
-    for shown in workspace.records()[:4]:
-        done = workspace.does("show", "out", shown["sample"])
-        verdict = "right" if shown["answer"]["correct"] else "wrong: the answer is "
-        assert f"\n{verdict}" in done.out
+    tracks = ["full_planning", "vqa"]
+    with workspace.served(OpenAIChat(), **{**vqa_suite(), "tracks": tracks}):
+        workspace.completed("--limit", "2")
+    for shown in workspace.records():
+        done = workspace.does("show", "out", shown["sample"], env={"COLUMNS": "80"})
+        assert max(map(len, done.out.splitlines())) <= 80
+        assert shown["reply"]["text"].splitlines()[0] in done.out
+        if shown["track"] == "vqa":
+            verdict = "right" if shown["answer"]["correct"] else "wrong: the answer is "
+            assert f"\n{verdict}" in done.out
+        else:
+            steps = re.findall(r"^\d+\. block (\d+): ", done.out, re.MULTILINE)
+            assert steps == [str(candidate) for candidate in shown["parse"]["plan"]]
 
 
 @pytest.fixture
@@ -201,35 +182,11 @@ def call(*words, typed=""):
 
 
 def test_tables_print_all_or_one_in_any_form(folder):
-    everything = call("report", folder, "--print").output
-    for caption in ("Full planning", "Wrong steps by type", "Coverage", "Tokens, cost"):
-        assert caption in everything
-    one = call("report", folder, "--print", "--only", "errors").output
-    assert one.startswith("Wrong steps by type (%)")
-    assert (
-        r"\begin{tabular}"
-        in call("report", folder, "--print", "--only", "cost", "--format", "tex").output
-    )
-    with pytest.raises(SpecError, match="no such table"):
-        call("report", folder, "--print", "--only", "table9")
+    printed = ("report", folder, "--print")
+    one = call(*printed, "--only", "errors").output
+    assert one in call(*printed).output
+    assert r"\begin{tabular}" in call(*printed, "--only", "cost", "--format", "tex").output
     assert not (folder / "tables").exists()
-
-
-def test_compare_says_the_verdict(folder, tmp_path):
-    done = call("compare", folder, "--models", "alpha,beta", "--out", tmp_path / "out")
-    # Five base scenes are too few for five comparisons.
-    assert "cannot tell" in done.output
-    assert (tmp_path / "out" / "comparison.tex").exists()
-    assert call("compare", folder, "--track", "full_planning").output.startswith("Models compared")
-    with pytest.raises(SpecError, match="no such track to compare"):
-        call("compare", folder, "--track", "vqa")
-    with pytest.raises(SpecError, match="no such model"):
-        call("compare", folder, "--models", "alpha,delta")
-    with pytest.raises(SpecError, match="a model twice"):
-        call("compare", folder, "--models", "alpha,alpha")
-    assert "empty name" in call("compare", folder, "--models", "alpha,").output
-    with pytest.raises(StoreError, match=r"holds no run\.yaml"):
-        call("compare", folder, tmp_path)
 
 
 def test_the_cache_is_listed_and_the_replies_of_one_model_are_deleted(tmp_path, monkeypatch):
@@ -238,34 +195,21 @@ def test_the_cache_is_listed_and_the_replies_of_one_model_are_deleted(tmp_path, 
         for key, model in enumerate(("openai/a", "openai/a", "openai/b")):
             cache.put(str(key), model, Reply(text="Step1"))
     listed = call("cache").output
-    assert re.findall(r"^(openai/.) +(\d+)", listed, re.MULTILINE) == [
-        ("openai/a", "2"),
-        ("openai/b", "1"),
-    ]
-    assert "3 replies, 0.0 MB, in" in listed
-    with pytest.raises(SpecError, match="did you mean openai/a"):
-        call("cache", "--clear", "opnai/a")
+    found = re.findall(r"^(openai/.) +(\d+)", listed, re.MULTILINE)
+    assert found == [("openai/a", "2"), ("openai/b", "1")]
     assert "Delete 2 replies of openai/a?" in call("cache", "--clear", "openai/a").output
     assert call("cache").output == listed
-    left = call("cache", "--clear", "openai/a", typed="y\n").output
-    assert "1 reply, 0.0 MB, in" in left
-    assert "openai/a " not in left
+    assert "openai/a " not in call("cache", "--clear", "openai/a", typed="y\n").output
+    assert "openai/b" in call("cache").output
 
 
-def test_figures_and_exports_name_what_they_wrote(folder):
+def test_figures_exports_and_comparisons_are_written_where_they_say(folder):
     done = call("figures", folder, "--only", "errors")
-    assert done.output.split() == [
-        str(folder / "paper" / f"errors.{e}") for e in ("pdf", "svg", "png", "txt")
-    ]
-    done = call("figures", folder, "--only", "losses", "--out", folder / "x")
-    assert (folder / "x" / "losses.pdf").is_file()
-    for wrong in ("--width wide", "--width 20"):
-        refused = call("figures", folder, *wrong.split())
-        assert refused.exit_code == 2, wrong
-        assert "Invalid value" in refused.output
-    with pytest.raises(SpecError, match="no such figure"):
-        call("figures", folder, "--only", "radar")
-    refused = call("export", folder, "--to", "vlmevalkit")
-    assert (refused.exit_code, "is not one of csv, hf" in refused.output) == (2, True)
+    made = [str(folder / "paper" / f"errors.{kind}") for kind in ("pdf", "svg", "png", "txt")]
+    assert done.output.split() == made
     done = call("export", folder, "--to", "csv")
     assert done.output.strip() == str(folder / "export" / "csv" / "records.csv")
+    done = call("compare", folder, "--models", "alpha,beta", "--out", folder / "x")
+    # Five base scenes are too few for five comparisons.
+    assert "cannot tell" in done.output
+    assert (folder / "x" / "comparison.tex").exists()

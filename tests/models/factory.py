@@ -8,6 +8,7 @@ import re
 import threading
 import time
 from collections.abc import Callable, Collection, Coroutine, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,6 @@ from phyblock.domain.scene import Block, Candidate, CandidateSet, Scene
 from phyblock.errors import BudgetReachedError, ModelError
 from phyblock.models.batch import BatchFiles
 from phyblock.models.cache import ReplyCache
-from phyblock.models.costs import Budget
 from phyblock.models.model import ModelEvent, RetryPolicy, build_model
 from phyblock.models.request import Image, Message, Model, Request
 from phyblock.records.record import BatchLine, Reply
@@ -110,45 +110,32 @@ def make_model(
     config: ModelConfig,
     *,
     cache: ReplyCache | None = None,
-    overall: asyncio.Semaphore | None = None,
-    budget: Budget | None = None,
     events: list[ModelEvent] | None = None,
     policy: RetryPolicy = QUICK,
+    **options: Any,
 ) -> Model:
     """A model with quick retries; its events go into the list."""
-    return build_model(
-        config,
-        cache=cache,
-        overall=overall or asyncio.Semaphore(64),
-        budget=budget,
-        report=(events if events is not None else []).append,
-        policy=policy,
-    )
+    report = (events if events is not None else []).append
+    return build_model(config, cache=cache, report=report, policy=policy, **options)
 
 
-def ask(model: Model, *requests: Request) -> list[Reply | ModelError | None]:
-    """Ask all at once and close the model; errors of calls stand among the replies."""
+async def answers(model: Model, *requests: Request) -> list[Any]:
+    """Ask all at once and close the model; errors and what stops it stand among the replies."""
 
-    async def one(request: Request) -> Reply | ModelError | None:
+    async def one(request: Request) -> Reply | ModelError | BudgetReachedError | None:
         try:
             return await model.ask(request)
-        except ModelError as error:
+        except (ModelError, BudgetReachedError) as error:
             return error
 
-    async def everything() -> list[Reply | ModelError | None]:
-        try:
-            return await asyncio.gather(*map(one, requests))
-        finally:
-            await model.aclose()
-
-    return asyncio.run(everything())
+    try:
+        return await asyncio.gather(*map(one, requests))
+    finally:
+        await model.aclose()
 
 
-def reply_of(model: Model, request: Request) -> Reply:
-    """The reply to one request, which must be one."""
-    (answer,) = ask(model, request)
-    assert isinstance(answer, Reply), answer
-    return answer
+def ask(model: Model, *requests: Request) -> list[Any]:
+    return asyncio.run(answers(model, *requests))
 
 
 POLL_S = 0.01
@@ -175,50 +162,25 @@ class Disk:
     def files(self, recorded: Collection[str], expected: int) -> BatchFiles:
         return BatchFiles(tuple(self.lines), self.put, self.folder, POLL_S, recorded, expected)
 
-    @property
-    def events(self) -> list[str]:
-        return [line.event for line in self.lines]
-
 
 async def command(
     config: ModelConfig,
     disk: Disk,
     requests: Sequence[Request],
     *,
-    budget: Budget | None = None,
-    told: list[ModelEvent] | None = None,
-    policy: RetryPolicy = QUICK,
     recorded: Sequence[Request] = (),
-) -> list[Reply | Exception]:
-    """Ask all at once, as one command does; what stops the model stands where it was met."""
-    cache = None if disk.cache is None else ReplyCache(disk.cache)
-    model = build_model(
-        config,
-        cache=cache,
-        budget=budget,
-        report=(told if told is not None else []).append,
-        policy=policy,
-        batches=disk.files({one.sample for one in recorded}, len(requests)),
-    )
-
-    async def ask(request: Request) -> Reply | Exception:
-        try:
-            return await model.ask(request)
-        except (ModelError, BudgetReachedError) as error:
-            return error
-
-    try:
-        ended = await asyncio.gather(*map(ask, requests))
-        # Or others would wait for it.
-        assert budget is None or not budget.holds
-        return ended
-    finally:
-        await model.aclose()
-        if cache is not None:
-            cache.close()
+    **options: Any,
+) -> list[Any]:
+    """Ask all at once, as one command does."""
+    with nullcontext() if disk.cache is None else ReplyCache(disk.cache) as cache:
+        files = disk.files({one.sample for one in recorded}, len(requests))
+        ended = await answers(make_model(config, cache=cache, batches=files, **options), *requests)
+    # Or others would wait for it.
+    assert options.get("budget") is None or not options["budget"].holds
+    return ended
 
 
-def run_command(*args: Any, **options: Any) -> list[Reply | Exception]:
+def run_command(*args: Any, **options: Any) -> list[Any]:
     return asyncio.run(command(*args, **options))
 
 
@@ -254,12 +216,10 @@ class Killing:
         task, killed = asyncio.create_task(work), asyncio.create_task(self._killed.wait())
         await asyncio.wait([task, killed], return_when=asyncio.FIRST_COMPLETED)
         is_over = task.done()
-        others = asyncio.all_tasks() - {asyncio.current_task()}
-        while others:
+        while others := asyncio.all_tasks() - {asyncio.current_task()}:
             for other in others:
                 other.cancel()
             await asyncio.wait(others)
-            others = asyncio.all_tasks() - {asyncio.current_task()}
         self._over.set()
         return is_over and not task.cancelled() and task.exception() is None
 

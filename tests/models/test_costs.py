@@ -257,15 +257,8 @@ def test_a_server_that_does_not_count_stops_within_the_limit(route, usage):
         tariff = Tariff(input=10.0, output=100.0)
         dearest = most_usd(tariff, asked.prompt_tokens, asked.most_completion_tokens)
 
-        @in_a_loop
-        async def ask_all():
-            model = make_model(config, budget=budget)
-            calls = (model.ask(make_request(f"{n:03}")) for n in range(40))
-            found = await asyncio.gather(*calls, return_exceptions=True)
-            await model.aclose()
-            return found
-
-        answers = ask_all()
+        requests = [make_request(f"{n:03}") for n in range(40)]
+        answers = ask(make_model(config, budget=budget), *requests)
     replies = [answer for answer in answers if isinstance(answer, Reply)]
     assert {type(answer) for answer in answers} == {Reply, BudgetReachedError}
     assert 0 < len(replies) == server.requests <= 0.1 / dearest

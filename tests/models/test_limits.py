@@ -22,7 +22,7 @@ from phyblock.models.client import HttpClient
 from phyblock.models.costs import Budget
 from phyblock.models.model import Clock, Limits, RetryPolicy, Server, Servers
 from phyblock.records.record import Reply
-from tests.models.factory import ROUTES, make_model, make_request
+from tests.models.factory import ROUTES, ask, make_model, make_request
 from tests.servers.chassis import Faults, Running
 from tests.workspace import in_a_loop
 
@@ -113,16 +113,12 @@ def test_tokens_count_as_reserved_until_a_reply_reports_them():
     async def sleep(seconds):
         waits.append(seconds)
 
-    async def main(url):
-        config = ROUTES["direct"].config(url, tpm=6_000)
-        clock = Clock(lambda: sum(waits), sleep)
-        model = make_model(config, policy=RetryPolicy(clock=clock))
-        used = [(await model.ask(make_request(key))).usage for key in ("000", "001", "002")][:2]
-        await model.aclose()
-        return sum(usage.prompt_tokens + usage.completion_tokens for usage in used)
-
+    policy = RetryPolicy(clock=Clock(lambda: sum(waits), sleep))
     with Running(ROUTES["direct"].server()) as running:
-        taken = asyncio.run(main(running.url))
+        config = ROUTES["direct"].config(running.url, tpm=6_000, max_concurrency=1)
+        requests = map(make_request, ("000", "001", "002"))
+        used = [reply.usage for reply in ask(make_model(config, policy=policy), *requests)][:2]
+    taken = sum(usage.prompt_tokens + usage.completion_tokens for usage in used)
     assert sum(waits) == pytest.approx(taken * 60 / 6_000)
 
 
@@ -187,7 +183,6 @@ class Script:
         self.failed_at: list[float] = []
         self.calls = 0
         self.waits: list[float] = []
-        self.told: list[float] = []
 
     async def send(self):
         self.calls += 1
@@ -202,13 +197,10 @@ class Script:
         self.now_s += seconds
 
     def run(self, **policy):
-        clock = Clock(lambda: self.now_s, self.sleep)
-        rules = RetryPolicy(clock=clock, **policy)
+        rules = RetryPolicy(clock=Clock(lambda: self.now_s, self.sleep), **policy)
 
         async def main():
-            return await rules.retrying("m", lambda event: self.told.append(event.wait_s))(
-                self.send
-            )
+            return await rules.retrying("m", lambda _: None)(self.send)
 
         return asyncio.run(main())
 
@@ -326,10 +318,10 @@ def test_whatever_is_waited_for_a_cancellation_ends_the_wait_and_nothing_is_sent
             await asyncio.sleep(0.01)
         await asyncio.gather(*asked, return_exceptions=True)
         await model.aclose()
-        return [answer]
+        return answer
 
     with Running(server) as running:
-        (answer,) = asyncio.run(main(running.url))
+        answer = asyncio.run(main(running.url))
     assert isinstance(answer, asyncio.CancelledError), answer
     assert server.requests == 1
 
@@ -346,12 +338,6 @@ def test_a_bug_of_ours_is_neither_sent_again_nor_charged(monkeypatch):
     for route in ROUTES.values():
         calls, budget = 0, Budget(100.0)
         config = route.config("http://127.0.0.1:9", price={"input": 1, "output": 1}, seed="never")
-
-        async def main():
-            model = make_model(config, budget=budget)  # noqa: B023
-            with pytest.raises(KeyError):
-                await model.ask(make_request())
-            await model.aclose()
-
-        asyncio.run(main())
+        with pytest.raises(KeyError):
+            ask(make_model(config, budget=budget), make_request())
         assert (calls, budget.spent_usd) == (1, 0.0)

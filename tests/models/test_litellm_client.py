@@ -18,11 +18,11 @@ from phyblock.config.suite import Suite
 from phyblock.errors import ModelError, RetryableError, UnavailableError
 from phyblock.models.client import KEYLESS, HttpClient
 from phyblock.models.costs import map_entry
-from phyblock.models.litellm_client import LitellmClient
 from phyblock.models.model import RetryPolicy
 from phyblock.models.request import Message
+from phyblock.records.record import Reply
 from phyblock.run.plan import to_config
-from tests.models.factory import ROUTES, ask, make_model, make_request, reply_of
+from tests.models.factory import ROUTES, ask, make_model, make_request
 from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import KEY_VARIABLE
@@ -307,7 +307,8 @@ def test_each_is_asked_with_what_it_takes():
                 include=shipped.model_fields_set - {"addresses", "api_key_env"}, by_alias=True
             )
             at = ROUTES[route].config(served[route].url, **{**given, "transport": "litellm"})
-            reply_of(make_model(at), replace(make_request(), params={}))
+            (reply,) = ask(make_model(at), replace(make_request(), params={}))
+            assert isinstance(reply, Reply), reply
             seen = served[route].server.seen[-1]
             limits = ("max_tokens", "max_completion_tokens", "max_output_tokens")
             assert [seen.params[key] for key in limits if key in seen.params] == [
@@ -317,20 +318,3 @@ def test_each_is_asked_with_what_it_takes():
                 assert not {"temperature", "top_p"} & shipped.params.keys(), name
                 # litellm sends Gemini the temperature that it has anyway.
                 assert seen.params.get("temperature", 1.0) == 1.0, name
-
-
-def test_of_a_large_error_litellm_sees_the_beginning_alone(monkeypatch):
-    """It looks for keys in all that it sees, again and again."""
-    sizes = []
-    after = LitellmClient._after
-
-    def noted(self, error, *others):
-        sizes.append(len(str(error)))
-        return after(self, error, *others)
-
-    monkeypatch.setattr(LitellmClient, "_after", noted)
-    with Running(AnyPath(500, b'{"error": "' + b"x" * 10**6 + b'"}')) as running:
-        answer = answer_of("hosted_vllm/m", api_base=f"{running.url}/v1")
-    assert isinstance(answer, RetryableError)
-    assert answer.status == 500
-    assert 0 < max(sizes) < 10**5

@@ -56,13 +56,6 @@ def test_a_broken_recording_is_an_error_at_its_place(tmp_path, content, said):
         answer(replay(tmp_path), "007")
 
 
-def test_a_folder_that_is_missing_or_empty_is_an_error_at_the_start(tmp_path):
-    with pytest.raises(DataError, match="recordings not found"):
-        replay(tmp_path / "nowhere")
-    with pytest.raises(DataError, match="no recorded replies"):
-        replay(tmp_path)
-
-
 KEPT = Reply(
     text=STEPS,
     reasoning="red",

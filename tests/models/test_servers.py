@@ -8,12 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from phyblock.config.models import ModelConfig
-from phyblock.errors import (
-    ModelError,
-    RetryableError,
-    UnavailableError,
-)
+from phyblock.errors import ModelError, RetryableError, UnavailableError
 from phyblock.models.costs import Budget, ModelBudget
 from phyblock.models.model import (
     MOST_CONNECTION_FAILURES,
@@ -24,13 +19,12 @@ from phyblock.models.model import (
     Servers,
 )
 from phyblock.records.record import Reply
-from tests.models.factory import ROUTES, ask, make_model, make_request, with_fields
+from tests.models.factory import ROUTES, answers, ask, make_model, make_request, with_fields
 from tests.models.test_limits import FakeTime
 from tests.servers.chassis import Faults, Running, kill, start
 from tests.servers.openai_chat import OpenAIChat
 
 REFUSED = RetryableError("connection refused", sent="no")
-LOST = RetryableError("connection refused", sent="lost")
 
 
 @dataclass
@@ -53,7 +47,7 @@ class Outage:
             await self.time.sleep(self.takes_s)
         if was_away or self.is_away():
             self.failed += 1
-            raise RetryableError(str(LOST), sent=LOST.sent)
+            raise RetryableError(str(REFUSED), sent="lost")
         self.answered += 1
         return Reply(text="Step1: Move block with index 1")
 
@@ -63,14 +57,13 @@ class Outage:
 
 def ask_through(client, time, *, samples, width, was_heard=False):
     """Ask as a run does, `width` samples at once, a stopped model no more."""
-    answers = []
+    found = []
 
     async def main():
         policy = RetryPolicy(clock=time.clock)
         server = Server("http://gone:1", client, was_heard=was_heard)
         servers = Servers((server,), policy, lambda _: None)
-        address = "http://gone:1/v1"
-        config = ModelConfig(name="m", id="openai/m", api_base=address, max_concurrency=width)
+        config = ROUTES["direct"].config("http://gone:1", max_concurrency=width)
         limits = Limits(config, asyncio.Semaphore(width), servers)
         model = ChatModel(
             config=config,
@@ -80,23 +73,22 @@ def ask_through(client, time, *, samples, width, was_heard=False):
             policy=policy,
             report=lambda _: None,
         )
-        queue = [make_request(f"{n:03}") for n in range(samples)]
+        queue = requests_of(samples)
 
         async def work():
             while queue:
                 request = queue.pop(0)
                 try:
-                    answers.append(await model.ask(request))
-                except UnavailableError as error:
-                    queue.clear()
-                    answers.append(error)
+                    found.append(await model.ask(request))
                 except ModelError as error:
-                    answers.append(error)
+                    found.append(error)
+                    if isinstance(error, UnavailableError):
+                        queue.clear()
 
         await time.run_until_done(*(asyncio.create_task(work()) for _ in range(width)))
 
     asyncio.run(main())
-    return answers
+    return found
 
 
 @settings(max_examples=40)
@@ -119,7 +111,7 @@ def test_a_wrong_address_stops_the_model_after_few_attempts_and_leaves_its_sampl
     assert {type(answer) for answer in answers} == {UnavailableError}
     assert len(answers) == width
     assert "http://gone:1 could not be reached for" in str(answers[0])
-    assert str(LOST) in str(answers[0])
+    assert str(REFUSED) in str(answers[0])
     assert client.failed <= width * MOST_CONNECTION_FAILURES
     assert 18 <= time.now_s < 300
 
@@ -141,11 +133,6 @@ def servers_of(count, policy=None):
     return Servers(made, policy or RetryPolicy(), lambda _: None)
 
 
-def break_off(servers, server, error=REFUSED):
-    for _ in range(2):
-        servers.failed(server, error, servers.policy.clock.now())
-
-
 @settings(max_examples=60)
 @given(
     st.integers(1, 6),
@@ -157,8 +144,8 @@ def test_whoever_is_asked_is_there_and_has_no_more_to_do_than_any_other_that_is(
 ):
     servers = servers_of(count, RetryPolicy(clock=FakeTime().clock))
     gone = data.draw(st.sets(st.integers(0, count - 1), max_size=count - 1))
-    for number in gone:
-        break_off(servers, servers.all[number])
+    for number in (*gone, *gone):
+        servers.failed(servers.all[number], REFUSED, servers.policy.clock.now())
     there = [server for number, server in enumerate(servers.all) if number not in gone]
     assert servers.cooling_s() == 0.0
     held = []
@@ -229,13 +216,8 @@ def at(*urls, route="direct", **fields):
     return with_fields(config, api_base=tuple(url + ROUTES[route].path for url in urls))
 
 
-async def answers_of(model, *names):
-    asked = (model.ask(make_request(name)) for name in names)
-    return list(await asyncio.gather(*asked, return_exceptions=True))
-
-
-def names(count):
-    return [f"{n:03}" for n in range(count)]
+def requests_of(count):
+    return [make_request(f"{n:03}") for n in range(count)]
 
 
 @pytest.mark.parametrize("route", ["direct", pytest.param("openai", marks=pytest.mark.slow)])
@@ -245,25 +227,23 @@ def test_servers_that_die_in_the_middle_lose_nothing(route):
     async def main():
         started = [await start(server, 0) for server in servers]
         config = at(*(f"http://127.0.0.1:{port}" for _, port in started), route=route)
-        policy = RetryPolicy(base_s=0.01, max_wait_s=0.05)
-        model = make_model(config, policy=policy)
-        asking = asyncio.create_task(answers_of(model, *names(120)))
+        model = make_model(config, policy=RetryPolicy(base_s=0.01, max_wait_s=0.05))
+        asking = asyncio.create_task(answers(model, *requests_of(120)))
         while sum(server.ended["ok"] for server in servers) < 40:
             await asyncio.sleep(0.005)
         await kill(*(runner for runner, _ in started[1:]))
-        answers = await asking
-        await model.aclose()
+        found = await asking
         await started[0][0].cleanup()
-        return answers
+        return found
 
-    answers = asyncio.run(main())
-    assert [type(answer) for answer in answers] == [Reply] * 120
+    found = asyncio.run(main())
+    assert [type(answer) for answer in found] == [Reply] * 120
     # No sample was sent again but those that were under way at a server that died.
     asked = sum((server.by_sample for server in servers), Counter())
     assert len(asked) == 120
     # What one loses may come to the next before that dies.
     assert sum(asked.values()) - 120 <= 120
-    assert sum(asked.values()) <= sum(a.attempts for a in answers if isinstance(a, Reply))
+    assert sum(asked.values()) <= sum(answer.attempts for answer in found)
 
 
 def test_a_server_that_refuses_everything_is_left_out_and_the_last_one_stops_the_model():
@@ -271,13 +251,13 @@ def test_a_server_that_refuses_everything_is_left_out_and_the_last_one_stops_the
     wrong, right = OpenAIChat(Faults(mode="404")), OpenAIChat()
     with Running(wrong) as first, Running(right) as second:
         config = at(first.url, second.url, max_concurrency=4)
-        replies = ask(make_model(config, events=events), *map(make_request, names(30)))
+        replies = ask(make_model(config, events=events), *requests_of(30))
         assert [type(reply) for reply in replies] == [Reply] * 30
         assert right.ended == {"ok": 30}
         assert wrong.requests <= 4
         (text,) = (event.message for event in events if event.kind == "notice")
         assert text.startswith(f"{first.url} is not used any more: ")
         right.faults = Faults(mode="404")
-        stopped = ask(make_model(config), *map(make_request, names(30)))
+        stopped = ask(make_model(config), *requests_of(30))
     assert {type(answer) for answer in stopped} == {UnavailableError}
     assert wrong.requests + right.ended["404"] <= 3 * 4

@@ -7,27 +7,11 @@ import yaml
 from phyblock.data.scenes import read_builtin
 from phyblock.sim.pictures import PictureStyle, candidates_png, goal_png
 from phyblock.tracks.base import presented
-from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import plan_text
 
 STYLE = PictureStyle(size_px=128)
 SEEDS = (0, 1)
-APART = {"size_px": 128, "layout": "separate"}
-
-
-def sighted(answers):
-    """Plans rightly what it is shown: it knows goals and grids by the digests of their pictures."""
-    return OpenAIChat(say=lambda seen: answers[seen.pictures])
-
-
-def digest(png):
-    return hashlib.sha256(png).hexdigest()
-
-
-def plan_of(task):
-    numbers = [task.candidates.index_of(block.look) for block in task.scene.blocks]
-    return plan_text(*numbers)
 
 
 def tasks_of(workspace):
@@ -47,28 +31,22 @@ def overall_f1(workspace):
 
 def test_a_model_that_looks_is_right_in_every_order(workspace):
     tasks = tasks_of(workspace)
-    shown = [presented(task, seed, "shuffled") for task in tasks.values() for seed in SEEDS]
-    answers = {
-        (digest(goal_png(one.scene, STYLE)), digest(candidates_png(one.candidates, STYLE))): (
-            plan_of(one)
-        )
-        for one in shown
-    }
-    workspace.write_suite(
-        models=["alpha", "beta"], images=APART, seeds=list(SEEDS), candidates={"order": "shuffled"}
-    )
-    with Running(sighted(answers)) as running:
-        workspace.write_models(running.url, "alpha", "beta", transport="direct")
+    answers = {}
+    for one in (presented(task, seed, "shuffled") for task in tasks.values() for seed in SEEDS):
+        pictures = (goal_png(one.scene, STYLE), candidates_png(one.candidates, STYLE))
+        plan = [one.candidates.index_of(block.look) for block in one.scene.blocks]
+        answers[tuple(hashlib.sha256(png).hexdigest() for png in pictures)] = plan_text(*plan)
+    suite = {"images": {"size_px": 128, "layout": "separate"}, "candidates": {"order": "shuffled"}}
+    # It knows goals and grids by the digests of their pictures.
+    sighted = OpenAIChat(say=lambda seen: answers[seen.pictures])
+    with workspace.served(sighted, "alpha", "beta", seeds=list(SEEDS), **suite):
         done = workspace.completed()
-        assert running.server.requests == 20
-    check_records(workspace.records(), tasks)
+    assert sighted.requests == 20
     assert "[candidates shuffled]" in done.out
     assert set(overall_f1(workspace).values()) == {1.0}
     check_scored_again(workspace)
-
-
-def check_records(records, tasks):
-    """All models were shown the same order, in whose numbers they answered."""
+    # All models were shown the same order, in whose numbers they answered.
+    records = workspace.records()
     assert len(records) == 20
     for record in records:
         task, plan = tasks[record["scene"]], record["parse"]["plan"]
@@ -87,26 +65,6 @@ def check_scored_again(workspace):
         for folder in (workspace.out, workspace.scored())
     )
     assert first == again
-
-
-def test_blind_leaves_out_the_goal_and_leaves_the_candidates(workspace):
-    grid = digest(candidates_png(tasks_of(workspace)["t1"].candidates, STYLE))
-    with workspace.served(
-        sighted({(grid,): "Step1: Move block with index 1"}),
-        entry={"transport": "direct"},
-        images=APART,
-        levels=[2, 3],
-        full_planning={"blind": True},
-    ) as server:
-        done = workspace.completed()
-        texts = {str(seen.parts[-1]) for seen in server.seen}
-        sent = [seen.pictures for seen in server.seen]
-    assert "[blind]" in " ".join(done.out.split())
-    shown = {"order": list(range(1, 17)), "blind": True}
-    assert all(record["shown"] == shown for record in workspace.records())
-    assert sent
-    assert all([*images] == [grid] for images in sent)
-    assert all("is not available" in text for text in texts)
 
 
 def test_episodes_are_shuffled_and_blind_as_well(workspace):
@@ -140,13 +98,12 @@ def test_blind_baselines_are_scored_beside_models_without_being_named(workspace)
     assert {record["model"] for record in workspace.records()} == {"oracle"}
     workspace.write_yaml("models.yaml", {"again": {"replay": str(workspace.out)}})
     workspace.out = workspace.root / "again"
-    blind = ["goal-blind", "random"]
-    workspace.write_suite(models=["again"], levels=[4])
-    suite = yaml.safe_load((workspace.root / "suite.yaml").read_text())
+    suite = yaml.safe_load(workspace.write_suite(models=["again"], levels=[4]).read_text())
     del suite["baselines"]
     workspace.write_yaml("suite.yaml", suite)
     done = workspace.completed()
-    assert [record["model"] for record in workspace.records()] == ["again", *blind]
+    models = [record["model"] for record in workspace.records()]
+    assert models == ["again", "goal-blind", "random"]
     assert "0 of 1 model is shown to be above goal-blind" in done.out
     # A run of baselines alone has those that it names.
     workspace.write_yaml("suite.yaml", {**suite, "models": ["random"]})
@@ -171,20 +128,11 @@ def moody(seen):
     return plan_text(*(byte % 5 + 1 for byte in draw[:3]))
 
 
-def prepare(workspace, url, **fields):
-    (workspace.root / "brief.j2").write_text(BRIEF, encoding="utf-8")
-    workspace.write_models(url, "alpha", transport="direct", seed="always")
-    workspace.write_suite(models=["alpha", "random"], limit=SCENES, **fields)
-
-
-def asked(server):
-    return [seen.sample for seen in server.seen]
-
-
 def test_every_way_is_asked_once_and_the_reference_is_what_a_plain_suite_asks(workspace):
-    with Running(OpenAIChat(say=moody)) as running:
-        server = running.server
-        prepare(workspace, running.url, vary=VARY)
+    (workspace.root / "brief.j2").write_text(BRIEF, encoding="utf-8")
+    suite = {"models": ["alpha", "random"], "limit": SCENES}
+    with workspace.served(OpenAIChat(say=moody), entry={"seed": "always"}) as server:
+        workspace.write_suite(**suite, vary=VARY)
         dry = workspace.run("--dry-run")
         assert "16 conditions" in dry.out
         assert f"{WAYS * SCENES} calls" in dry.out
@@ -196,7 +144,7 @@ def test_every_way_is_asked_once_and_the_reference_is_what_a_plain_suite_asks(wo
         factors = [r["factor"] for r in workspace.rows("sensitivity") if r["model"] == "alpha"]
         assert factors == [name for name in VARY if name != "repeats"]
         workspace.out = workspace.root / "plain"
-        prepare(workspace, running.url, images={"size_px": 128, "background": "checkerboard"})
+        workspace.write_suite(**suite, images={"size_px": 128, "background": "checkerboard"})
         workspace.completed("--models", "alpha")
         assert len(workspace.records()) == SCENES
         assert server.requests == WAYS * SCENES

@@ -1,14 +1,10 @@
 """Costs of a run: expected by a dry run as providers bill, and never above max_cost_usd."""
 
-import io
 import json
-import re
 from contextlib import ExitStack
 
 import pytest
-from rich.console import Console
 
-from phyblock.cli.run import print_estimate
 from phyblock.config.models import load_models
 from phyblock.config.suite import load_suite
 from phyblock.models.costs import text_tokens
@@ -40,10 +36,11 @@ def test_the_limit_is_not_passed_and_a_higher_one_goes_on(workspace):
     with workspace.served(
         OpenAIChat(), entry={"price": PRICE, "max_tokens": 100}, seeds=list(range(12))
     ) as server:
+        dry = workspace.completed("--dry-run")
+        assert "60 calls, about $" in dry.out
         first = workspace.run("--set", f"limits.max_cost_usd={MOST_USD}")
         assert (first.code, first.err) == (1, "")
         assert f"of ${MOST_USD} spent; the next call can cost $" in first.out
-        assert "run the same command again" in first.out
         assert spent(workspace) == pytest.approx(CALL_USD * server.requests)
         # It stops no earlier than it must: another two calls at their dearest would pass it.
         assert MOST_USD - 2 * (CALL_USD + 100 * PRICE["output"] / 1e6) < spent(workspace)
@@ -56,40 +53,6 @@ def test_the_limit_is_not_passed_and_a_higher_one_goes_on(workspace):
         more = workspace.completed("--set", "limits.max_cost_usd=5")
         assert "All 60 samples are done" in more.out
         assert server.requests == 60
-
-
-@pytest.mark.parametrize(("prompt", "completion"), [(40_000, 40), (1000, 2500)])
-def test_a_server_that_counts_more_than_is_expected_does_not_pass_the_limit_at_once(
-    workspace, prompt, completion
-):
-    usd = (prompt * PRICE["input"] + completion * PRICE["output"]) / 1e6
-    usage = {"prompt_tokens": prompt, "completion_tokens": completion}
-    with workspace.served(
-        OpenAIChat(usage=usage), entry={"price": PRICE, "max_tokens": 100}, seeds=list(range(12))
-    ) as server:
-        done = workspace.run("--set", f"limits.max_cost_usd={5 * usd}")
-    assert done.code == 1
-    assert f"the next call can cost ${usd:.1f}"[:-2] in done.out
-    assert 1 < server.requests <= 5
-    assert spent(workspace) <= 5 * usd
-
-
-def test_a_dry_run_says_what_it_would_cost_and_asks_nothing(workspace):
-    with Running(OpenAIChat()) as running:
-        workspace.write_models(running.url, "alpha", price=PRICE, max_tokens=9000)
-        workspace.write_suite(models=["alpha", "random"], seeds=[0, 1])
-        before = workspace.files()
-        done = workspace.completed("--dry-run")
-        assert "10 calls, about $" in done.out
-        usual, most = re.findall(r"\$([\d.]+)", done.out)[:2]
-        assert 10 * 4000 * PRICE["output"] / 1e6 < float(usual) < 5
-        assert 10 * 9000 * PRICE["output"] / 1e6 < float(most) < 10
-        assert running.server.requests == 0
-        assert workspace.files() == before
-
-        workspace.completed("--yes")
-        after = workspace.run("--dry-run")
-        assert "0 calls, about $0.00" in after.out
 
 
 @pytest.mark.parametrize(
@@ -153,12 +116,6 @@ def begin(workspace, stack):
     return servers
 
 
-def printed(plan, rows):
-    console = Console(file=io.StringIO(), width=150)
-    print_estimate(console, plan, rows)
-    return console.file.getvalue()
-
-
 @in_a_loop
 async def asked(workspace, plan):
     """Ask everything of a plan; no tables are made."""
@@ -177,7 +134,6 @@ def test_a_dry_run_is_near_the_bill_of_every_provider(workspace):
         rows = estimate(plan, workspace.out, use_cache=False)
         asked(workspace, plan)
         left = estimate(plan, workspace.out, use_cache=False)
-    assert f"about ${sum(row.cost_usd for row in rows):.2f}" in printed(plan, rows)
     records = workspace.records()
     for row in rows:
         billed = servers[row.model.name].billed

@@ -22,7 +22,7 @@ from phyblock.errors import SimulationError
 from phyblock.records.files import STOPPED
 from phyblock.run.plan import make_plan
 from phyblock.run.rescore import rescore
-from phyblock.run.runner import SampleDone, Session, Stopping, to_its_end
+from phyblock.run.runner import SampleDone, Session, Stopping
 from phyblock.run.store import AppendFile
 from phyblock.sim import dynamics
 from phyblock.tracks.full_planning import FullPlanning
@@ -45,20 +45,6 @@ def wait_for(condition):
     raise AssertionError("this did not come to pass")
 
 
-def ended(process):
-    out, err = process.communicate(timeout=60)
-    return process.returncode, out, err
-
-
-def interrupted(process, server, name):
-    """Interrupt a run while its calls are held, and let them be answered once it waits for them."""
-    wait_for(lambda: server.at_once == AT_ONCE)
-    process.send_signal(name)
-    assert f"waiting for {AT_ONCE} calls in progress" in process.stdout.readline()
-    server.holds = False
-    return ended(process)
-
-
 def prepare(workspace, server, *names):
     limits = {"max_concurrency": AT_ONCE}
     return workspace.served(server, *names, seeds=[0, 1, 2, 3], limits=limits)
@@ -69,9 +55,13 @@ def test_calls_under_way_are_waited_for_and_those_that_wait_for_their_turn_are_n
     workspace, name
 ):
     with prepare(workspace, OpenAIChat(holds=True), "alpha", "beta") as server:
-        code, out, err = interrupted(workspace.start(), server, name)
-
-        assert (code, err) == (130, "")
+        process = workspace.start()
+        wait_for(lambda: server.at_once == AT_ONCE)
+        process.send_signal(name)
+        assert f"waiting for {AT_ONCE} calls in progress" in process.stdout.readline()
+        server.holds = False
+        out, err = process.communicate(timeout=60)
+        assert (process.returncode, err) == (130, "")
         assert f"{AT_ONCE} of {2 * SAMPLES} samples are done (interrupted)" in out
         assert f"phyblock run suite.yaml --out {workspace.out}" in out
         assert server.requests == AT_ONCE
@@ -82,27 +72,9 @@ def test_calls_under_way_are_waited_for_and_those_that_wait_for_their_turn_are_n
         assert f"All {2 * SAMPLES} samples are done" in done.out
         assert server.requests == 2 * SAMPLES
         before = workspace.files()
-        again = workspace.run()
-        assert again.code == 0
-        (hint,) = {*again.out.splitlines()} - {*done.out.splitlines()}
-        assert hint.endswith("--print shows its tables.")
+        workspace.completed()
         assert server.requests == 2 * SAMPLES
         assert workspace.files() == before
-
-
-def test_a_second_interrupt_ends_at_once(workspace):
-    with prepare(workspace, OpenAIChat(Faults(mode="slow"))) as server:
-        process = workspace.start()
-        wait_for(lambda: server.at_once == AT_ONCE)
-        process.send_signal(signal.SIGINT)
-        said = process.stdout.readline()
-        assert "Ctrl-C again" in said
-        process.send_signal(signal.SIGINT)
-        code, out, err = ended(process)
-    assert (code, err) == (130, "")
-    assert f"0 of {SAMPLES} samples are done (interrupted)" in out
-    assert "run the same command again" in out
-    assert not workspace.records()
 
 
 PROGRAM = """
@@ -208,16 +180,13 @@ def test_a_mistake_of_ours_loses_no_call_under_way(workspace, monkeypatch, place
         if isinstance(event, SampleDone | Stopping):
             raise ZeroDivisionError("in watch")
 
-    async def run():
-        watch = watches_badly if place == "watch" else nobody
-        if place == "judge":
-            monkeypatch.setattr(FullPlanning, "judge", judges_badly)
-        await session(workspace, watch, "alpha").run()
-
+    watch = watches_badly if place == "watch" else nobody
+    if place == "judge":
+        monkeypatch.setattr(FullPlanning, "judge", judges_badly)
     with Running(FirstAtOnce()) as running:
         workspace.write_models(running.url, "alpha")
         with pytest.raises(ZeroDivisionError, match=f"in {place}"):
-            asyncio.run(run())
+            asyncio.run(session(workspace, watch, "alpha").run())
         assert running.server.ended == {"ok": AT_ONCE}
     assert len(workspace.records()) == AT_ONCE - (place == "judge")
 
@@ -322,40 +291,16 @@ def test_no_process_outlives_a_killed_run(workspace):
     with prepare(workspace, OpenAIChat()):
         with workspace.start("--yes") as process:
             family = []
-            while not any("spawn_main" in " ".join(words_of(child)) for child in family):
+            while not any("spawn_main" in words for _, words in family):
                 assert process.poll() is None
-                family = psutil.Process(process.pid).children(recursive=True)
+                with contextlib.suppress(psutil.NoSuchProcess):
+                    children = psutil.Process(process.pid).children(recursive=True)
+                    family = [(child, " ".join(child.cmdline())) for child in children]
                 time.sleep(0.01)
             os.kill(process.pid, signal.SIGKILL)
             process.wait()
-        _, alive = psutil.wait_procs(family, timeout=30)
+        _, alive = psutil.wait_procs([child for child, _ in family], timeout=30)
     assert not alive
-
-
-def words_of(process):
-    with contextlib.suppress(psutil.NoSuchProcess):
-        return process.cmdline()
-    return []
-
-
-NOWHERE = "http://127.0.0.1:9"
-
-
-@pytest.mark.parametrize("words", ["HTTP 429", "no connection to 127.0.0.1:9"])
-def test_a_wait_for_another_attempt_or_for_a_server_is_given_up(workspace, words):
-    with prepare(workspace, OpenAIChat(Faults(rate_limited=1.0, retry_after="100"))) as server:
-        if "429" not in words:
-            workspace.write_models(NOWHERE, "alpha")
-        process = workspace.start()
-        while words not in process.stdout.readline():
-            assert process.poll() is None
-        wait_for(lambda: not server.at_once)
-        process.send_signal(signal.SIGINT)
-        code, out, err = ended(process)
-    assert (code, err) == (130, "")
-    assert f"0 of {SAMPLES} samples are done (interrupted)" in out
-    assert not workspace.records()
-    assert server.requests <= AT_ONCE
 
 
 def test_work_of_a_worker_that_was_killed_is_done_again_once(tmp_path):
@@ -369,26 +314,3 @@ def test_work_of_a_worker_that_was_killed_is_done_again_once(tmp_path):
         asyncio.run(work())
     finally:
         shop.close()
-
-
-def test_what_must_be_done_is_done_though_nobody_waits():
-    done = []
-
-    async def work():
-        await asyncio.sleep(0.05)
-        done.append("work")
-        return "record"
-
-    async def wait():
-        return await to_its_end(work())
-
-    async def cancelled():
-        waiting = asyncio.create_task(wait())
-        for _ in range(3):
-            await asyncio.sleep(0.01)
-            waiting.cancel()
-        return await waiting
-
-    assert asyncio.run(cancelled()) == ("record", True)
-    assert done == ["work"]
-    assert asyncio.run(wait()) == ("record", False)

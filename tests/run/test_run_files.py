@@ -4,7 +4,6 @@ import errno
 import hashlib
 import json
 import os
-import time
 from contextlib import closing
 from pathlib import Path
 
@@ -18,7 +17,7 @@ from phyblock.records.files import BatchLines, CallLines, PromptLines, RecordLin
 from phyblock.records.record import Call, Reply
 from phyblock.run.plan import make_plan
 from phyblock.run.store import AppendFile, Progress, RunStore
-from tests.servers.chassis import Faults, Running
+from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
 
 values = st.dictionaries(st.text(max_size=5), st.text(max_size=5) | st.integers(), max_size=4)
@@ -170,21 +169,3 @@ def test_tables_and_page_are_made_again_where_records_are_newer_or_they_are_not_
     records = workspace.out / "records.jsonl"
     records.write_bytes(records.read_bytes() + records.read_bytes().splitlines(True)[-1])
     assert is_made(page=True)
-
-
-def test_a_run_whose_records_are_taken_away_asks_no_more_and_says_so(workspace):
-    with workspace.served(
-        OpenAIChat(Faults(latency_s=0.02)), entry={"max_concurrency": 2}, seeds=list(range(20))
-    ) as server:
-        with workspace.start("--yes") as process:
-            while process.poll() is None and server.requests < 10:
-                time.sleep(0.002)
-            (workspace.out / "records.jsonl").unlink()
-            _, errors = process.communicate()
-        assert process.returncode == 2
-        assert "records.jsonl: was removed, replaced or changed" in errors
-        assert server.requests < 100
-        asked = server.requests
-        workspace.completed("--yes")
-        assert server.requests == 100 < asked + 100
-    assert len(workspace.records()) == 100

@@ -3,16 +3,11 @@
 import json
 import random
 import shutil
-import subprocess
-import sys
-import threading
 import time
-from pathlib import Path
 
 import pytest
 import yaml
 
-import phyblock
 from phyblock.data.base import VERSION_FILE, read_version
 from phyblock.errors import DataError, SpecError
 from phyblock.records.files import read_manifest
@@ -22,7 +17,6 @@ from phyblock.results.load import load_run
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.web.factory import manifest, run_of
-from tests.workspace import call
 
 SCORED = ("estimates.csv", "errors.csv", "errors.tex", "table1.csv", "table1.tex")
 
@@ -43,22 +37,17 @@ def copy(finished, tmp_path):
     return finished.copied(tmp_path / "copy")
 
 
-def lasting(files):
-    """Run, records and tables; what is noted of builds may change."""
-    parts = ("run.yaml", "records.jsonl", "/tables/")
-    return {name: data for name, data in files.items() if any(part in name for part in parts)}
-
-
 def scores(records):
     """Return what was read in each reply and what it is worth, by sample."""
     return {r["sample"]: {k: r[k] for k in ("outcome", "parse", "scores")} for r in records}
 
 
 def test_tables_follow_from_the_records_byte_for_byte(copy):
-    files, tables = copy.files(), copy.tables()
+    path, tables = copy.out / "records.jsonl", copy.tables()
+    kept = path.read_bytes(), (copy.out / "run.yaml").read_bytes()
     copy.does("score", "out", fresh=True)
-    assert lasting(copy.files()) == lasting(files)
-    path = copy.out / "records.jsonl"
+    assert (path.read_bytes(), (copy.out / "run.yaml").read_bytes()) == kept
+    assert copy.tables() == tables
     lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
     random.Random(3).shuffle(lines)
     path.write_text("".join(lines), encoding="utf-8")
@@ -127,7 +116,6 @@ def test_a_second_process_is_refused_and_the_first_goes_on(workspace):
             out, err = first.communicate()
         assert second.code == 2
         assert "out: is being written by another phyblock run" in second.err
-        assert len(second.errors) == 1
         assert (first.returncode, err) == (0, "")
         assert "All 5 samples are done" in out
         assert server.requests == 5
@@ -218,15 +206,13 @@ def test_runs_on_two_versions_are_not_mixed(workspace):
     workspace.completed()
     (workspace.root / "data" / VERSION_FILE).write_text("2\n", encoding="utf-8")
     refused = workspace.run()
-    assert refused.code != 0
-    assert "out: holds another run" in refused.err
+    assert refused.code == 2
     assert "dataset.version (1, now 2)" in refused.err
-    newer = workspace.root / "newer"
-    workspace.does("run", "suite.yaml", "--out", newer, "--no-report")
-    versions = [read_manifest(path).dataset for path in (workspace.out, newer)]
-    assert [data.version for data in versions if data is not None] == [1, 2]
+    older, workspace.out = workspace.out, workspace.root / "newer"
+    workspace.completed()
+    assert [read_manifest(path).dataset.version for path in (older, workspace.out)] == [1, 2]
     with pytest.raises(SpecError, match=r"dataset\.version: cannot be compared"):
-        compare(load_run(workspace.out), load_run(newer), ["oracle"])
+        compare(load_run(older), load_run(workspace.out), ["oracle"])
 
 
 def test_answers_to_two_versions_of_questions_are_not_mixed():
@@ -238,9 +224,8 @@ def test_answers_to_two_versions_of_questions_are_not_mixed():
 def test_a_record_is_one_line_of_json_whatever_the_reply_holds(workspace):
     text = "Step1: Move block with index 1\n\u2028\x85\r\0\ud800 ￿ 😀"
     with workspace.served(OpenAIChat(say=lambda _: text)) as server:
-        done = workspace.completed()
-        again = workspace.run()
-        assert (again.code, len({*again.out.splitlines()} - {*done.out.splitlines()})) == (0, 1)
+        for _ in range(2):
+            workspace.completed()
         assert server.requests == 5
     lines = (workspace.out / "records.jsonl").read_bytes().split(b"\n")[:-1]
     assert len(lines) == 5
@@ -254,55 +239,3 @@ def test_scores_can_be_made_where_the_data_set_has_moved(copy):
     manifest.write_text(lost, encoding="utf-8")
     assert copy.phyblock("score", "out").code == 2
     copy.does("score", "out", "--data", "moved")
-
-
-# The path of one sample: the modules that it goes through, and those it imports.
-
-ROOT = Path(phyblock.__file__).parent
-MOST_ENTERED = 20
-MOST_IMPORTED = 100
-
-IMPORTED = (
-    "import atexit, sys\n"
-    "from phyblock.cli.main import main\n"
-    "names = lambda: [name for name in sys.modules if name.partition('.')[0] == 'phyblock']\n"
-    "atexit.register(lambda: print('modules', *names(), file=sys.stderr))\n"
-    "main()\n"
-)
-
-
-def test_one_sample_goes_through_few_modules(inside):
-    """From the arrival of the second request to that of the third: the end of one sample and the
-    beginning of the next, in every thread.
-    """
-    inside.write_suite(models=["alpha"], levels=[2, 3], settings=["A"])
-    entered = set()
-
-    def profile(frame, event, _):
-        if event == "call" and len(server.seen) == 2:
-            entered.add(frame.f_code.co_filename)
-
-    with Running(server := OpenAIChat()) as running:
-        inside.write_models(running.url, "alpha", max_concurrency=1)
-        threading.setprofile(profile)
-        sys.setprofile(profile)
-        try:
-            call("run", "suite.yaml", "--out", "out")
-        finally:
-            sys.setprofile(None)
-            threading.setprofile(None)
-    assert server.requests == 4
-    modules = {Path(name).relative_to(ROOT) for name in entered if name.startswith(str(ROOT))}
-    assert Path("models/model.py") in modules
-    assert len(modules) <= MOST_ENTERED, " ".join(sorted(map(str, modules)))
-
-
-def test_one_sample_of_a_baseline_imports_few_modules(workspace):
-    workspace.write_suite(models=["random"], levels=[2], settings=["A"])
-    command = [sys.executable, "-c", IMPORTED, "run", "suite.yaml", "--limit", "1", "--out", "out"]
-    done = subprocess.run(
-        command, cwd=workspace.root, env=workspace.env, capture_output=True, text=True, check=True
-    )
-    modules = done.stderr.rpartition("modules ")[2].split()
-    assert "phyblock.tracks.full_planning" in modules
-    assert len(modules) <= MOST_IMPORTED, sorted(modules)

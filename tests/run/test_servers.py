@@ -14,21 +14,14 @@ from tests.servers.openai_chat import OpenAIChat
 from tests.servers.other_protocols import AnthropicMessages, GeminiGenerate
 from tests.workspace import KEY_VARIABLE
 
+COMPATIBLE = (
+    *("hosted_vllm", "lm_studio", "llamafile", "xai", "dashscope", "mistral", "openrouter"),
+    *("together_ai", "moonshot", "zai", "meta", "novita"),
+)
 WAYS = [
     ("OPENAI_BASE_URL", "openai/m", "/v1", OpenAIChat),
     ("OPENAI_API_BASE", "openai/m", "/v1", OpenAIChat),
-    ("HOSTED_VLLM_API_BASE", "hosted_vllm/m", "/v1", OpenAIChat),
-    ("LM_STUDIO_API_BASE", "lm_studio/m", "/v1", OpenAIChat),
-    ("LLAMAFILE_API_BASE", "llamafile/m", "/v1", OpenAIChat),
-    ("XAI_API_BASE", "xai/m", "/v1", OpenAIChat),
-    ("DASHSCOPE_API_BASE", "dashscope/m", "/v1", OpenAIChat),
-    ("MISTRAL_API_BASE", "mistral/m", "/v1", OpenAIChat),
-    ("OPENROUTER_API_BASE", "openrouter/m", "/v1", OpenAIChat),
-    ("TOGETHER_AI_API_BASE", "together_ai/m", "/v1", OpenAIChat),
-    ("MOONSHOT_API_BASE", "moonshot/m", "/v1", OpenAIChat),
-    ("ZAI_API_BASE", "zai/m", "/v1", OpenAIChat),
-    ("META_API_BASE", "meta/m", "/v1", OpenAIChat),
-    ("NOVITA_API_BASE", "novita/m", "/v1", OpenAIChat),
+    *((f"{name.upper()}_API_BASE", f"{name}/m", "/v1", OpenAIChat) for name in COMPATIBLE),
     ("ANTHROPIC_API_BASE", "anthropic/claude-3-7-sonnet-20250219", "", AnthropicMessages),
     ("ANTHROPIC_BASE_URL", "anthropic/claude-3-7-sonnet-20250219", "", AnthropicMessages),
     ("GEMINI_API_BASE", "gemini/gemini-2.5-flash", "", GeminiGenerate),
@@ -88,12 +81,6 @@ class Parrot(OpenAIChat):
         return super().error(status, ending, f"{message} {self.seen[-1].key}")
 
 
-def everything(workspace):
-    """All bytes below the workspace but the pictures."""
-    files = (path for path in workspace.root.rglob("*") if path.is_file())
-    return {str(path): path.read_bytes() for path in files if path.suffix != ".png"}
-
-
 @pytest.mark.parametrize("transport", ["direct", pytest.param("litellm", marks=pytest.mark.slow)])
 def test_keys_and_pictures_stay_off_the_disk(workspace, transport):
     others = tuple((f"echo-key-{kind}", 0.04) for kind in ("in-reply", "json", "cut", "page"))
@@ -106,9 +93,8 @@ def test_keys_and_pictures_stay_off_the_disk(workspace, transport):
         Running(servers["refuses"]) as refuses,
     ):
         urls = {"talks": talks.url, "locked": locked.url, "refuses": refuses.url}
-        common = {"transport": transport}
         entries = {
-            name: {"id": f"hosted_vllm/{name}", "api_base": f"{url}/v1", **common}
+            name: {"id": f"hosted_vllm/{name}", "api_base": f"{url}/v1", "transport": transport}
             for name, url in urls.items()
         }
         # Other limits, so that none is answered from another's cached replies and its key unused.
@@ -128,7 +114,7 @@ def test_keys_and_pictures_stay_off_the_disk(workspace, transport):
     assert used == {KEYS[name] for name in names}
     assert {r["outcome"] for r in workspace.records()} >= {"ok", "api_error"}
 
-    found = everything(workspace)
+    found = workspace.files()
     assert any(name.endswith("replies.sqlite") for name in found)
     found |= {f"output {i}": (done.out + done.err).encode() for i, done in enumerate(told)}
     for name, content in found.items():
