@@ -1,6 +1,8 @@
 """The public API: names, costs, the guide to it, and tasks, one by one, in any thread."""
 
 import asyncio
+import contextlib
+import inspect
 import itertools
 import pickle
 import re
@@ -27,11 +29,11 @@ PNG = b"\x89PNG\r\n\x1a\n"
 
 def test_public_names_are_these_and_completion_finds_them():
     assert phyblock.__all__ == NAMES
-    assert all(getattr(phyblock, name).__doc__ for name in phyblock.__all__)
     assert set(phyblock.__all__) <= set(dir(phyblock))
     assert phyblock.__version__ == version("phyblock")
-    for name in ("load_suite", "render", "run_suite", "load_run", "tasks", "generate", "verify"):
-        assert "return" in typing.get_type_hints(getattr(phyblock, name)), name
+    for one in (getattr(phyblock, name) for name in phyblock.__all__):
+        assert one.__doc__
+        assert not inspect.isfunction(one) or "return" in typing.get_type_hints(one)
     with pytest.raises(AttributeError, match="has no attribute 'nothing'"):
         _ = phyblock.nothing
 
@@ -151,8 +153,7 @@ def test_a_reply_is_worth_what_it_is_in_a_run(track, tmp_path):
 @pytest.mark.parametrize("track", TRACKS)
 def test_a_task_asks_as_a_run_does(track):
     found = phyblock.tasks(track, limit=2)
-    shop = Workshop()
-    try:
+    with contextlib.closing(Workshop()) as shop:
         for task in found:
             opened = type(task.track)(found.suite, task.track.dataset, 2, shop)
             if task.plays:
@@ -163,8 +164,6 @@ def test_a_task_asks_as_a_run_does(track):
             assert task.request().messages == request.messages
             assert task.messages()[-1]["role"] == "user"
             assert len(task.pictures) == str(task.messages()).count("data:image/png;base64,")
-    finally:
-        shop.close()
 
 
 def test_the_rewards_of_an_episode_sum_to_its_score():
@@ -227,9 +226,3 @@ def test_finite_sets_hold_each_scene_once_and_have_slices():
     assert [one.key for one in finite[1:]] == [finite[1].key, finite[2].key]
     with pytest.raises(SpecError, match="give 1 scenes"):
         _distinct(itertools.repeat(finite[0].track.dataset.tasks[0]), 2)
-
-
-def test_answers_can_be_asked_for_as_json():
-    (task,) = phyblock.tasks("vqa", "answer_format=json_schema", "vqa.subtasks=[SH]", limit=1)
-    assert task.answer_schema["required"] == ["reasoning", "answer"]
-    assert phyblock.tasks("vqa", limit=1)[0].answer_schema is None

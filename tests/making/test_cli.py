@@ -1,15 +1,9 @@
 """The verbs of `phyblock scenes` and `phyblock questions` as a person calls them."""
 
-import importlib.util
 import io
-import os
 import re
 import shutil
-import signal
-import subprocess
-import sys
 from functools import partial
-from pathlib import Path
 
 import click
 import pytest
@@ -19,7 +13,6 @@ from PIL import Image
 from phyblock.cli.main import phyblock
 from phyblock.errors import DataError, InputError, StoreError
 from phyblock.files import LIST, bundled
-from phyblock.making.scenes.production import Production, Share
 from phyblock.sim.engine import other_engine
 from phyblock.workers import open_workers
 from tests.workspace import SCENES, invoked, read_lines, tower, write_lines
@@ -48,10 +41,12 @@ def test_what_is_made_is_verified_and_a_changed_scene_is_named(folder, tmp_path)
     spoiled = read_lines(folder / "scenes.jsonl")[0]
     spoiled["blocks"][-1]["position"][2] += 0.01
     write_lines(tmp_path / "scenes.jsonl", [spoiled])
-    (tmp_path / "SHA256SUMS").write_text(f"{'0' * 64}  scenes.jsonl\n", encoding="utf-8")
+    sums = "".join(f"{'0' * 64}  {name}\n" for name in ("scenes.jsonl", "README.md"))
+    (tmp_path / "SHA256SUMS").write_text(sums, encoding="utf-8")
     done = scenes("verify", *ALONE, tmp_path)
     assert done.return_value == 1
     assert "scenes.jsonl: differs from its checksum" in done.output
+    assert "README.md: is missing" in done.output
     assert f"failed: {spoiled['id']}" in done.output
     assert "floats 10.00 mm above its support" in done.output
 
@@ -279,71 +274,7 @@ def test_an_audit_says_what_it_finds(asked, tmp_path):
 
 # Workers
 
-SHARES = (Share("1", 3, 1), Share("2", 4, 2), Share("3", 2, 1))
-HAS_RAY = importlib.util.find_spec("ray") is not None
-
-
-def killed_once(mark):
-    """Kill the process that works on it, but for the second time."""
-    try:
-        Path(mark).touch(exist_ok=False)
-    except FileExistsError:
-        return os.getpid()
-    os.kill(os.getpid(), signal.SIGKILL)
-    raise AssertionError
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(not HAS_RAY, reason="Ray is not installed: pip install 'phyblock[ray]'")
-@pytest.mark.filterwarnings("ignore")
-def test_a_killed_worker_loses_and_doubles_nothing(tmp_path):
-    with open_workers() as workers:
-        expected = list(Production(3, "kit", workers).scenes(SHARES))
-    with open_workers(2, "local") as workers:
-        marks = [str(tmp_path / str(number)) for number in range(3)]
-        assert len(list(workers.map(killed_once, marks))) == 3
-        assert list(Production(3, "kit", workers).scenes(SHARES)) == expected
-
 
 def test_no_ray_and_no_cluster_are_told():
     with pytest.raises(InputError, match="--ray"), open_workers(2, "127.0.0.1:1"):
         pass
-
-
-@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGKILL])
-def test_workers_end_with_the_process_that_started_them(sent, tmp_path):
-    for name, text in (("work.py", WORK), ("tasks.py", TASKS)):
-        (tmp_path / name).write_text(text, encoding="utf-8")
-    words = [sys.executable, str(tmp_path / "work.py")]
-    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "start_new_session": True}
-    with subprocess.Popen(words, **pipes) as process:
-        assert int(process.stdout.readline()) != int(process.stdout.readline())
-        # Ctrl-C reaches the whole group, a kill one process alone.
-        (os.killpg if sent == signal.SIGINT else os.kill)(process.pid, sent)
-        # The workers hold the pipe open: it ends when they have.
-        _, errors = process.communicate(timeout=30)
-    assert process.returncode == (130 if sent == signal.SIGINT else -signal.SIGKILL)
-    assert b"Traceback" not in errors
-
-
-TASKS = """
-import time, os
-
-def stay(n):
-    os.write(1, f"{os.getpid()}\\n".encode())
-    time.sleep(60)
-"""
-
-
-WORK = """
-import sys
-from phyblock.workers import open_workers
-from tasks import stay
-
-if __name__ == "__main__":
-    try:
-        with open_workers(2) as workers:
-            list(workers.map(stay, range(2)))
-    except KeyboardInterrupt:
-        sys.exit(130)
-"""

@@ -13,42 +13,19 @@ from phyblock.data.scenes import read_builtin
 from phyblock.domain.blocks import SHAPES
 from phyblock.domain.question import LETTERS, Mark, QuestionPicture
 from phyblock.domain.scene import Block, Scene
-from phyblock.domain.symmetry import SYMMETRIES, turned_form
+from phyblock.domain.symmetry import SYMMETRIES
 from phyblock.files import bundled
+from phyblock.making.questions import dynamics
 from phyblock.making.questions.base import WORDINGS, Draft, UnfairError, four_alike, ranks_among
-from phyblock.making.questions.dynamics import (
-    STAYS,
-    THIN_M,
-    WIDE_M,
-    AffordanceMaker,
-    balances_on_edges,
-    bench,
-    four_plans,
-    free_tops,
-    group_of,
-    is_sure,
-    lowered,
-    outcomes_of,
-    points_of,
-    resting_on,
-    stays_at,
-)
 from phyblock.making.questions.guesses import keeping_odds
 from phyblock.making.questions.production import BALANCE, even_letters
 from phyblock.making.questions.properties import layers_of, sure_blocks
-from phyblock.making.questions.relations import (
-    AXIS_TURNS,
-    LENGTHS,
-    images,
-    phrases,
-    put_beside,
-)
+from phyblock.making.questions.relations import AXIS_TURNS, LENGTHS, images, phrases, put_beside
 from phyblock.making.questions.sight import SHAPE_WORDS, names, resolve, resolve_one
-from phyblock.making.questions.views import ViewpointMaker
 from phyblock.making.scenes.sketch import POSES, transformed
 from phyblock.sim.balance import is_balanced
 from phyblock.sim.contact import find_gaps, find_overlaps, support_graph
-from phyblock.sim.question_pictures import least_difference, seen, seen_order
+from phyblock.sim.question_pictures import seen, seen_order
 from tests.sim.structures import block as solid
 from tests.sim.structures import tower
 
@@ -169,11 +146,11 @@ def test_a_hidden_block_is_sure_where_one_that_shows_rests_on_it_alone():
 def benches(weights, pillar_m, rng):
     """Yield a bench on a top of each scene that has one."""
     for scene in SCENES:
-        if tops := free_tops(scene.blocks):
-            yield bench(scene.blocks, tops[0], weights, pillar_m, len(scene) + 1, rng)
+        if tops := dynamics.free_tops(scene.blocks):
+            yield dynamics.bench(scene.blocks, tops[0], weights, pillar_m, len(scene) + 1, rng)
 
 
-@pytest.mark.parametrize("pillar_m", [0.0, THIN_M, WIDE_M])
+@pytest.mark.parametrize("pillar_m", [0.0, dynamics.THIN_M, dynamics.WIDE_M])
 def test_a_bench_leaves_the_scene_as_it_is_and_its_lever_says_what_stays(pillar_m):
     """Nothing overlaps or floats; statics mostly say what a lever does, but for other tops.
 
@@ -194,9 +171,9 @@ def test_a_bench_leaves_the_scene_as_it_is_and_its_lever_says_what_stays(pillar_
             if not stands:
                 continue
             order = on.loose[-1].order
-            resting = resting_on(blocks, order)
-            assert resting_on(blocks, order, only=True) <= resting
-            broken += bool(resting) is is_sure(blocks[:-1], ())
+            resting = dynamics.resting_on(blocks, order)
+            assert dynamics.resting_on(blocks, order, only=True) <= resting
+            broken += bool(resting) is dynamics.is_sure(blocks[:-1], ())
     for stays in (True, False):
         assert said[stays, stays] > 4 * said[stays, not stays]
     assert broken
@@ -216,27 +193,29 @@ def test_what_lies_on_edges_when_a_block_goes_is_told_from_what_lies_on_tops(
         block(3, (0.0, -0.05, 0.025), kind=sides, euler=(euler[0], 0.0, 180.0)),
         block(4, (0.0, 0.0, 0.05), (1, 2, 3), kind="triangle"),
     )
-    assert balances_on_edges(blocks, 1, frozenset()) is is_on_edges
-    assert not balances_on_edges(blocks, 1, frozenset({4}))
+    assert dynamics.balances_on_edges(blocks, 1, frozenset()) is is_on_edges
+    assert not dynamics.balances_on_edges(blocks, 1, frozenset({4}))
 
 
 def test_what_plainly_becomes_of_a_block_is_what_statics_say():
     """Nearly always: only what a block is set on is looked at, not what is further below."""
     rng, said = np.random.default_rng(4), Counter[tuple[int, bool]]()
-    drafts = (AffordanceMaker().drafts(scene, rng) for scene in SCENES[::40])
+    drafts = (dynamics.AffordanceMaker().drafts(scene, rng) for scene in SCENES[::40])
     for draft in itertools.islice(itertools.chain.from_iterable(drafts), 4):
         plain, (put,) = draft.pictures[0], draft.pictures[1].blocks
         shown = {seen_order(plain, seen(plain), mark.position_m) for mark in draft.options}
         assert len(shown - {None}) == len(LETTERS)
-        points = points_of(plain, rng)
-        outcomes = outcomes_of(plain.blocks, put, points)
+        points = dynamics.points_of(plain, rng)
+        outcomes = dynamics.outcomes_of(plain.blocks, put, points)
         for at, outcome in zip(points.at_m.tolist(), outcomes.tolist(), strict=True):
-            lowest = lowered(put, plain.blocks, *at[:2])
+            lowest = dynamics.lowered(put, plain.blocks, *at[:2])
             if outcome:
-                said[outcome, is_balanced(group_of((*plain.blocks, lowest), put.order))] += 1
+                said[
+                    outcome, is_balanced(dynamics.group_of((*plain.blocks, lowest), put.order))
+                ] += 1
     assert {outcome for outcome, _ in said} == {1, 2, 3}
     for outcome, _ in said:
-        stays = outcome == STAYS
+        stays = outcome == dynamics.STAYS
         assert said[outcome, stays] > 9 * said[outcome, not stays]
 
 
@@ -244,8 +223,8 @@ def test_what_plainly_becomes_of_a_block_is_what_statics_say():
 def test_of_four_next_steps_one_stays_however_far_its_plank_hangs_over(rank):
     """All lean by steps, with margins to either side of what the top bears."""
     rng, others = np.random.default_rng(3), set[int]()
-    for on, other in zip(benches(2, THIN_M, rng), itertools.cycle(range(4))):
-        plans = four_plans(on, (rank, other), rng)
+    for on, other in zip(benches(2, dynamics.THIN_M, rng), itertools.cycle(range(4))):
+        plans = dynamics.four_plans(on, (rank, other), rng)
         if not plans:
             continue
         leans, over = on.leans_m(np.array(plans)), np.abs(plans)[:, 0]
@@ -275,24 +254,7 @@ VIEW = (300.0, 35.0)
 def test_a_block_stays_where_the_plank_does_not_tip(place_m, stays):
     """It falls off the wall as well; unsure is where the weights are nearly over the edge."""
     plain = QuestionPicture("scene", (*PLANK, WALL), VIEW, marks=(Mark("A", (*place_m, TOP_M)),))
-    assert stays_at(plain, PUT, (*place_m, TOP_M)) is stays
-
-
-def test_options_of_viewpoints_differ_in_colors_at_one_height_alone():
-    maker, rng = ViewpointMaker(), np.random.default_rng(5)
-    found = [draft for scene in SCENES[::40] for draft in maker.drafts(scene, rng)]
-    assert {draft.wording for draft in found} == {"vp-match", "vp-side"}
-    for draft in found:
-        options = [option for option in draft.options if isinstance(option, QuestionPicture)]
-        held = [
-            sorted((round(100 * b.position_m[2]), b.color) for b in one.blocks) for one in options
-        ]
-        assert held == [held[0]] * 4
-        shots = [seen(option) for option in options]
-        assert all((shot.block == shots[0].block).all() for shot in shots)
-        assert least_difference(shots) >= 0.1 * (shots[0].block >= 0).sum()
-        shown = turned_form(draft.pictures[0].blocks)
-        assert [turned_form(o.blocks) == shown for o in options] == [True, False, False, False]
+    assert dynamics.stays_at(plain, PUT, (*place_m, TOP_M)) is stays
 
 
 # Choices: ranks of the right option, drafts that are kept, letters

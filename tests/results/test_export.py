@@ -15,20 +15,8 @@ from phyblock.integrations import huggingface
 from phyblock.integrations.files import write_vlmevalkit
 from phyblock.results.export import export_frame, write_csv
 from phyblock.results.load import load_run
-from tests.web.factory import LEVELS, manifest, record, score, write_run
+from tests.web.factory import LEVELS, asked, manifest, record, score, write_run
 from tests.workspace import csv_rows
-
-
-def asked(model, seed, right, key="sh-1"):
-    question = {"id": "sh-1", "subtask": "SH", "category": "object_property"}
-    return record(model, "000", seed) | {
-        "sample": f"vqa/{model}/{key}/s{seed}",
-        "track": "vqa",
-        "key": key,
-        "question": question | {"rotation": int(key[-1]) if "-r" in key else 0},
-        "parse": {"rule": "letter", "letters": "A" if right else "B"},
-        "answer": {"right": "A", "given": "A" if right else "B", "correct": right},
-    }
 
 
 @pytest.fixture
@@ -42,7 +30,7 @@ def folder(tmp_path):
             records.append(record("alpha", scene, seed, scores, prompt_tokens=100))
     records[0]["prompt"] = {"template": "x", "version": "1", "images": [], "messages": "d1"}
     records[1] = record("alpha", "000", 1, [score(0, 0, 4)], outcome="missing")
-    records += [asked("alpha", 0, True), asked("alpha", 1, False)]
+    records += [asked(1, "SH", "A", 0), asked(1, "SH", "B", 1)]
     records.append(record("beta", "000", 0, outcome="api_error"))
     made = write_run(tmp_path / "run", records, facts)
     prompt = {"role": "user", "parts": ["Look at", {"image": "goal"}]}
@@ -56,17 +44,12 @@ def test_rows_hold_what_was_asked_answered_and_counted(folder):
     assert len(frame) == 13
     row = frame.loc["full_planning/alpha/002/s0"]
     assert (row["tp_a"], row["fp_a"], row["fn_a"], row["tp_b"]) == (2, 1, 1, 2)
-    assert (row["reply"], row["plan"], row["prompt_tokens"]) == (
-        "Move block with index 1",
-        [1],
-        100,
-    )
+    assert (row["plan"], row["prompt_tokens"]) == ([1], 100)
+    assert row["reply"] == "Move block with index 1"
     assert frame.loc["full_planning/alpha/000/s0", "prompt"] == "Look at\n[picture: goal]"
     assert pd.isna(frame.loc["full_planning/alpha/000/s1", "reply"])
-    assert frame.loc["vqa/alpha/sh-1/s1", ["question_subtask", "answer_given"]].tolist() == [
-        "SH",
-        "B",
-    ]
+    answer = frame.loc["vqa/alpha/sh-1/s1", ["question_subtask", "answer_given"]]
+    assert answer.tolist() == ["SH", "B"]
     assert frame.loc["full_planning/beta/000/s0", "error"] == "busy"
 
 

@@ -2,16 +2,8 @@
 
 import pytest
 
+from phyblock.results import figures
 from phyblock.results.estimates import Headline
-from phyblock.results.figures import (
-    COLUMN_IN,
-    cost,
-    figures_of,
-    forest,
-    levels,
-    shares,
-    write_paper_figures,
-)
 from phyblock.results.load import load_run
 from tests.web.factory import LEVELS, manifest, record, run_of, score, write_run
 
@@ -36,17 +28,17 @@ def run():
 
 def test_lines_show_the_headline_shares_fill_a_bar_and_a_forest_has_a_row_a_pair(run):
     values = Headline(run, TRACK).values
-    drawn = levels(run, track=TRACK)
+    drawn = figures.levels(run, track=TRACK)
     for line in drawn.axes[0].lines:
         wanted = [values[str(line.get_label()), f"Level {n}"].value for n in (1, 2, 3, 4)]
         assert list(line.get_ydata()) == pytest.approx(wanted)
-    drawn = cost(run, track=TRACK)
+    drawn = figures.cost(run, track=TRACK)
     points = {round(line.get_xdata()[0], 6): line.get_ydata()[0] for line in drawn.axes[0].lines}
     assert points == pytest.approx(
         {n + 1.0: values[model, "Overall F1"].value for n, model in enumerate(MODELS)}
     )
     for table in ("errors", "losses"):
-        drawn = shares(run, track=TRACK, table=table)
+        drawn = figures.shares(run, track=TRACK, table=table)
         widths = {}
         for bar in drawn.axes[0].patches:
             place = round(bar.get_y(), 3)
@@ -54,9 +46,11 @@ def test_lines_show_the_headline_shares_fill_a_bar_and_a_forest_has_a_row_a_pair
         assert all(width == pytest.approx(100) for width in widths.values())
     # Of two models a row a part.
     for n, rows in ((3, 3), (2, 5)):
-        drawn = forest(run_of(records(n), manifest(models=MODELS[:n], seeds=[0])), track=TRACK)
+        drawn = figures.forest(
+            run_of(records(n), manifest(models=MODELS[:n], seeds=[0])), track=TRACK
+        )
         assert len(drawn.axes[0].get_yticks()) == rows
-    assert forest(run_of(records(1), manifest(models=MODELS[:1])), track=TRACK) is None
+    assert figures.forest(run_of(records(1), manifest(models=MODELS[:1])), track=TRACK) is None
 
 
 def test_a_run_without_an_answer_draws_nothing_and_does_not_fail(tmp_path):
@@ -64,22 +58,22 @@ def test_a_run_without_an_answer_draws_nothing_and_does_not_fail(tmp_path):
         record(model, scene, 0, [], outcome="api_error") for model in MODELS for scene in LEVELS
     ]
     write_run(tmp_path, failed, manifest(models=MODELS, seeds=[0]))
-    assert write_paper_figures(load_run(tmp_path)) == ()
+    assert figures.write_paper_figures(load_run(tmp_path)) == ()
 
 
 def test_files_are_the_same_each_time_in_three_formats_with_captions(tmp_path):
     folder = write_run(tmp_path / "run", records(), manifest(models=MODELS, seeds=[0]))
     run = load_run(folder)
-    first = {file: file.read_bytes() for file in write_paper_figures(run)}
+    first = {file: file.read_bytes() for file in figures.write_paper_figures(run)}
     assert {file.stem for file in first} == {
         *("levels-full-planning", "errors", "losses", "cost-full-planning", "forest-full-planning")
     }
-    again = write_paper_figures(run, ["levels-full-planning", "errors"])
+    again = figures.write_paper_figures(run, ["levels-full-planning", "errors"])
     assert len(again) == 8
     assert all(file.read_bytes() == first[file] for file in again)
-    assert {file.stem for file in first} <= set(figures_of(run))
+    assert {file.stem for file in first} <= set(figures.figures_of(run))
     assert not any(b"mathdefault" in data for file, data in first.items() if file.suffix == ".svg")
-    files = write_paper_figures(run, ["errors"], width_in=COLUMN_IN, titled=False)
+    files = figures.write_paper_figures(run, ["errors"], width_in=figures.COLUMN_IN, titled=False)
     assert {file.name for file in files} == {
         f"errors.{ending}" for ending in ("pdf", "svg", "png", "txt")
     }

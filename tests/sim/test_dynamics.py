@@ -14,19 +14,11 @@ from phyblock.domain.scene import Block
 from phyblock.making.scenes.sketch import POSES
 from phyblock.sim import dynamics
 from phyblock.sim.contact import drop_height_m
-from phyblock.sim.dynamics import (
-    DEFAULT_TRIAL,
-    ONE_SETTING,
-    Trial,
-    check,
-    check_steps,
-    settle,
-)
-from phyblock.sim.engine import Physics, Pose, open_world
+from phyblock.sim.dynamics import DEFAULT_TRIAL, ONE_SETTING, check, check_steps, settle
+from phyblock.sim.engine import Pose, open_world
 from phyblock.sim.outcomes import after_removal, holds
-from tests.shipped import TASKS, official_tasks
+from tests.shipped import TASKS
 from tests.sim.structures import block, built, tower
-from tests.sim.test_geometry import FLOATING
 
 FIRST = replace(DEFAULT_TRIAL, physics=DEFAULT_TRIAL.physics[:1])
 LINE_BALANCED = {"bowl", "bowl-turned"}
@@ -84,13 +76,6 @@ def test_execution_depends_on_no_process_and_no_processor_and_loads_engines_late
         return done.stdout
 
     assert printed() == printed(OPENBLAS_CORETYPE="Nehalem")
-
-
-@pytest.mark.slow
-def test_of_all_official_scenes_only_the_floating_fall(official_checkout):
-    trial = Trial(physics=(Physics(),))
-    tasks = official_tasks(official_checkout)
-    assert {t.scene.id for t in tasks if not check(t.scene.blocks, trial).stable} == FLOATING
 
 
 def test_what_falls_midway_or_slowly_is_named_at_its_step():

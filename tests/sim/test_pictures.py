@@ -19,29 +19,11 @@ from phyblock.domain.scene import Candidate, CandidateSet, Scene
 from phyblock.errors import DataError
 from phyblock.making.scenes.candidates import make_candidates
 from phyblock.making.scenes.sketch import POSES
-from phyblock.sim import ruled
+from phyblock.sim import pictures, ruled
 from phyblock.sim.backgrounds import GROUNDS
 from phyblock.sim.camera import Window, frame, view_axes
 from phyblock.sim.engine import Pose, quat_xyzw_to_euler_deg
 from phyblock.sim.film import assembly_gif
-from phyblock.sim.pictures import (
-    COLOR_RGB,
-    LABEL_STRIP,
-    PictureStyle,
-    camera_for,
-    candidate_camera,
-    candidates_key,
-    common_distance_m,
-    drawn_m,
-    goal_camera,
-    goal_key,
-    goal_png,
-    goal_style,
-    on_the_floor,
-    picture,
-    segments,
-    shoot,
-)
 from phyblock.sim.question_pictures import (
     block_mark,
     drawn_blocks,
@@ -59,7 +41,7 @@ from tests.shipped import TASKS, built_in_questions
 from tests.sim.structures import block, clouds, scene_of, tower
 
 TASK = TASKS[0]
-STYLE, SMALL = PictureStyle(), PictureStyle(size_px=128)
+STYLE, SMALL = pictures.PictureStyle(), pictures.PictureStyle(size_px=128)
 MARGIN, LEAST_CONTRAST = 0.16, 3.0
 EVERY_LOOK = [
     Candidate(kind, color, euler) for kind, color in KIT_PALETTE for euler in POSES[kind].values()
@@ -120,7 +102,7 @@ def test_framing_keeps_every_point_in_the_window_and_comes_as_close_as_it_may(
 
 
 def lies_between_planes(blocks, camera):
-    points = np.vstack([drawn_m(one) for one in blocks])
+    points = np.vstack([pictures.drawn_m(one) for one in blocks])
     depths = (points - camera.eye_m) @ camera.axes[2]
     return bool(0 < camera.near_m < depths.min() and depths.max() < camera.far_m)
 
@@ -128,8 +110,8 @@ def lies_between_planes(blocks, camera):
 @pytest.mark.parametrize("every", [16, pytest.param(1, marks=pytest.mark.slow)])
 def test_no_built_in_picture_is_cut_open_and_blocks_of_wide_goals_are_large(every):
     for task in TASKS[::every]:
-        style = goal_style(task.scene, STYLE)
-        camera = goal_camera(task.scene, style)
+        style = pictures.goal_style(task.scene, STYLE)
+        camera = pictures.goal_camera(task.scene, style)
         assert lies_between_planes(task.scene.blocks, camera)
         places = np.array([one.position_m for one in task.scene.blocks])
         farthest_m = ((places - camera.eye_m) @ camera.axes[2]).max()
@@ -143,14 +125,14 @@ def test_no_built_in_picture_is_cut_open_and_blocks_of_wide_goals_are_large(ever
 @settings(max_examples=30)
 def test_all_candidates_of_a_grid_have_one_scale_and_the_largest_fills_its_cell(looks, elevation):
     style = replace(STYLE, elevation_deg=elevation)
-    blocks = [on_the_floor(*look.look[:2], look.euler_deg) for look in looks]
-    distance_m = common_distance_m(blocks, style)
+    blocks = [pictures.on_the_floor(*look.look[:2], look.euler_deg) for look in looks]
+    distance_m = pictures.common_distance_m(blocks, style)
     fullest = []
     for one in blocks:
-        camera = candidate_camera(one, style, distance_m)
-        depths = (drawn_m(one) - camera.eye_m) @ camera.axes[2]
+        camera = pictures.candidate_camera(one, style, distance_m)
+        depths = (pictures.drawn_m(one) - camera.eye_m) @ camera.axes[2]
         assert (depths.min() + depths.max()) / 2 == pytest.approx(distance_m)
-        shown = camera.project(drawn_m(one))
+        shown = camera.project(pictures.drawn_m(one))
         assert np.abs(shown).max() < 0.87
         fullest.append(max(np.ptp(shown, axis=0) / [1.72, 1.40]))
     assert max(fullest) == pytest.approx(1.0, abs=1e-6)
@@ -159,14 +141,14 @@ def test_all_candidates_of_a_grid_have_one_scale_and_the_largest_fills_its_cell(
 def test_every_look_has_a_picture_of_its_own_that_fills_its_cell_above_the_number():
     found = {}
     for candidate in EVERY_LOOK:
-        one = on_the_floor(candidate.type, candidate.color, candidate.euler_deg)
-        camera = candidate_camera(one, STYLE)
-        rows, columns = np.nonzero(shoot([one], camera, 128).block >= 0)
-        assert 0.04 * 128 < rows.min() <= rows.max() < 128 * (1 - LABEL_STRIP)
+        one = pictures.on_the_floor(candidate.type, candidate.color, candidate.euler_deg)
+        camera = pictures.candidate_camera(one, STYLE)
+        rows, columns = np.nonzero(pictures.shoot([one], camera, 128).block >= 0)
+        assert 0.04 * 128 < rows.min() <= rows.max() < 128 * (1 - pictures.LABEL_STRIP)
         assert 0.04 * 128 < columns.min() <= columns.max() < 0.96 * 128
-        share = max(np.ptp(rows) / (1 - LABEL_STRIP), np.ptp(columns)) / 128
+        share = max(np.ptp(rows) / (1 - pictures.LABEL_STRIP), np.ptp(columns)) / 128
         assert 0.6 < share < 0.95
-        image = picture([one], camera, "white", 64)
+        image = pictures.picture([one], camera, "white", 64)
         found.setdefault(candidate.look, np.asarray(image).astype(np.int64))
     for one_look, other in itertools.combinations(found.values(), 2):
         assert (np.abs(one_look - other).max(axis=-1) > 45).mean() > 0.01
@@ -180,16 +162,18 @@ def luminance(rgb):
 
 
 @pytest.mark.parametrize("background", slowly)
-@pytest.mark.parametrize("color", COLOR_RGB)
+@pytest.mark.parametrize("color", pictures.COLOR_RGB)
 def test_every_face_stands_out_from_the_floor(background, color):
     """By a contrast of 3:1, its own or that of the line round it, along nine tenths of its edge.
 
     The floor is taken nine pixels to the side, where it may be in shadow.
     """
-    one, size_px = on_the_floor("cube", color, (0.0, 0.0, 0.0)), 256
-    camera = camera_for([one], STYLE, "cube")
-    light = luminance(np.asarray(picture([one], camera, background, size_px), dtype=np.float64))
-    inside = np.pad(segments([one], camera, size_px) >= 0, 4)
+    one, size_px = pictures.on_the_floor("cube", color, (0.0, 0.0, 0.0)), 256
+    camera = pictures.camera_for([one], STYLE, "cube")
+    light = luminance(
+        np.asarray(pictures.picture([one], camera, background, size_px), dtype=np.float64)
+    )
+    inside = np.pad(pictures.segments([one], camera, size_px) >= 0, 4)
     rows, columns = np.nonzero(inside & ~np.roll(inside, 1, 1) | inside & ~np.roll(inside, -1, 1))
     clear = []
     for row, column in zip(rows - 4, columns - 4, strict=True):
@@ -216,9 +200,9 @@ def test_keys_differ_exactly_where_pixels_may():
         *(replace(PLAIN, background=name) for name in BACKGROUNDS if name != STYLE.background),
     ]
     keys = [
-        *(goal_key(one, SMALL) for one in (scene, other, turned)),
-        *(goal_key(scene, replace(SMALL, **change)) for change in looks),
-        *(candidates_key(make_candidates(one), SMALL) for one in (scene, other)),
+        *(pictures.goal_key(one, SMALL) for one in (scene, other, turned)),
+        *(pictures.goal_key(scene, replace(SMALL, **change)) for change in looks),
+        *(pictures.candidates_key(make_candidates(one), SMALL) for one in (scene, other)),
         *(ruled_key(one, SMALL) for one in (scene, other)),
         *(kit_key(one, SMALL) for one in (kit, CandidateSet(kit.candidates[:-1]))),
         *(question_key(one, STYLE) for one in recipes),
@@ -226,7 +210,7 @@ def test_keys_differ_exactly_where_pixels_may():
     ]
     assert len({*keys}) == len(keys)
     assert {len(key) for key in keys} == {hashlib.sha256().digest_size * 2}
-    assert goal_key(replace(scene, id="another", levels=(4,)), SMALL) == keys[0]
+    assert pictures.goal_key(replace(scene, id="another", levels=(4,)), SMALL) == keys[0]
     plain = question_key(PLAIN, STYLE)
     assert question_key(replace(PLAIN, label="A"), STYLE) == plain
     assert question_key(PLAIN, replace(STYLE, azimuth_deg=200.0)) == plain
@@ -239,11 +223,11 @@ def test_a_style_is_checked_and_can_be_sent_to_a_process():
     bad = [{"size_px": 10}, {"background": "lava"}, {"elevation_deg": -5.0}]
     for wrong in [*bad, {"azimuth_deg": float("nan")}]:
         with pytest.raises(ValueError, match=next(iter(wrong))):
-            PictureStyle(**wrong)
+            pictures.PictureStyle(**wrong)
     with pytest.raises(ValueError, match="oblique"):
-        PictureStyle.from_view("below")
+        pictures.PictureStyle.from_view("below")
     with pytest.raises(DataError, match="empty"):
-        goal_png(scene_of([], "empty"), SMALL)
+        pictures.goal_png(scene_of([], "empty"), SMALL)
 
 
 @given(angles, st.floats(-85, 85), angles)
@@ -257,9 +241,12 @@ def test_any_orientation_comes_back_from_its_quaternion(x, y, z):
 @settings(max_examples=30)
 def test_no_picture_is_cut_off_or_open_whatever_it_frames(blocks, framed, azimuth, elevation):
     """Not even where blocks lie behind the place from which those in the frame are seen best."""
-    style = PictureStyle(azimuth_deg=azimuth, elevation_deg=elevation)
-    corners = np.vstack([drawn_m(one) for one in blocks])
-    assert np.abs(goal_camera(scene_of(blocks), style).project(corners)).max() <= 1 - MARGIN + 1e-9
+    style = pictures.PictureStyle(azimuth_deg=azimuth, elevation_deg=elevation)
+    corners = np.vstack([pictures.drawn_m(one) for one in blocks])
+    assert (
+        np.abs(pictures.goal_camera(scene_of(blocks), style).project(corners)).max()
+        <= 1 - MARGIN + 1e-9
+    )
     assert is_inside(QuestionPicture("s", tuple(blocks), (azimuth, elevation)))
     recipe = QuestionPicture(
         "s", tuple(blocks), (azimuth, elevation), framed=tuple(blocks[:framed])
@@ -281,7 +268,7 @@ def test_a_state_is_seen_as_the_goal_is_and_changes_where_a_block_comes():
         question_png(state_picture(scene, scene.blocks[:count], SMALL), SMALL)
         for count in range(len(scene) + 1)
     ]
-    assert states[-1] == goal_png(scene, SMALL)
+    assert states[-1] == pictures.goal_png(scene, SMALL)
     for before, after in itertools.pairwise(map(pixels, states)):
         assert 0 < (before != after).any(axis=2).mean() < 0.5
 
@@ -300,7 +287,7 @@ def test_all_that_is_ruled_and_written_is_in_the_picture(places, azimuth_deg, el
     beyond = [(*field.x, field.beyond(0, 5)), (*field.y, field.beyond(1, 5)), (0.0,)]
     ends = np.array([*itertools.product(*beyond)])
     assert np.abs(camera.project(ends / 100)).max() <= 1
-    points = np.vstack([drawn_m(one) for one in blocks]) * 100
+    points = np.vstack([pictures.drawn_m(one) for one in blocks]) * 100
     for axis, (low, high) in enumerate((field.x, field.y)):
         assert low % 5 == high % 5 == 0
         assert low <= points[:, axis].min() - 3 + 1e-6
@@ -316,7 +303,7 @@ def test_an_animation_ends_in_the_goal_and_blocks_are_placed_in_order():
     with Image.open(io.BytesIO(assembly_gif(scene, SMALL))) as image:
         assert (image.n_frames, image.info["loop"]) == (len(scene), 0)
         *_, last = (np.asarray(one.convert("RGB")) for one in ImageSequence.Iterator(image))
-    assert np.abs(last - pixels(goal_png(scene, SMALL))).mean() < 3
+    assert np.abs(last - pixels(pictures.goal_png(scene, SMALL))).mean() < 3
     backward = Scene("backward", (1,), scene.blocks[::-1], ("backward",))
     with pytest.raises(DataError, match="backward"):
         assembly_gif(backward, SMALL)

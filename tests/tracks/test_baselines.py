@@ -17,16 +17,8 @@ from phyblock.parsing.plan import parse_plan
 from phyblock.parsing.poses import parse_poses
 from phyblock.scoring.plan import Goal
 from phyblock.sim.pictures import joined_size_px
+from phyblock.tracks import goal_blind
 from phyblock.tracks.full_planning import PlanSubject, pick_plan
-from phyblock.tracks.goal_blind import (
-    AREA_KEYS,
-    KEYS,
-    chances,
-    color_areas,
-    goal_blind_plans,
-    related,
-    units,
-)
 from phyblock.tracks.picking import Choice, Pick, Picking
 from phyblock.tracks.pose_planning import pick_poses
 from phyblock.tracks.questions import (
@@ -113,16 +105,6 @@ def test_what_is_learned_from_shares_no_base_scene_with_what_is_answered():
         assert all(held_out.isdisjoint(question.scene.parents) for question in known)
 
 
-def test_letters_of_pictures_and_orders_go_by_frequency():
-    pictures = tuple(f"<img{i}>" for i in range(1, 5))
-    questions = [question(n, pictures, (2,) if n % 3 else (0,)) for n in range(60)]
-    orders = [question(n, pictures, (3, 1, 0, 2), "OR") for n in range(20)]
-    for learn in (majority_rule, text_rule):
-        guesses = guesses_of([*questions, *orders], learn)
-        assert {guesses(one) for one in questions} == {(2,)}
-        assert {guesses(one) for one in orders} == {(3, 1, 0, 2)}
-
-
 KIT = tuple(Candidate(*kind, (0.0, 0.0, 0.0)) for kind in KIT_PALETTE)
 
 
@@ -154,7 +136,7 @@ def drawn_sets(draw):
 @settings(max_examples=25)
 def test_a_plan_names_candidates_of_its_set(drawn, setting, repeats):
     scenes, sets = drawn
-    plans = goal_blind_plans(scenes, sets, setting, repeats=repeats)
+    plans = goal_blind.goal_blind_plans(scenes, sets, setting, repeats=repeats)
     assert set(plans) == set(sets)
     for name, plan in plans.items():
         assert plan.steps
@@ -171,12 +153,12 @@ def test_no_goal_has_a_part_in_what_is_learned_for_its_own_base_scene(drawn, set
     own = sets[scenes[at].id].candidates
     others = tuple(data.draw(st.lists(st.sampled_from(own), min_size=1, max_size=5)))
     changed = [*scenes[:at], scene(scenes[at].id, others, scenes[at].parents), *scenes[at + 1 :]]
-    kin = related(scenes)
+    kin = goal_blind.related(scenes)
     areas = {color: data.draw(st.sampled_from([0.0, 0.15, 0.5])) for color in COLORS}
-    offered = [units(sets[one.id], setting, areas) for one in scenes]
+    offered = [goal_blind.units(sets[one.id], setting, areas) for one in scenes]
     goals = [[Goal(one, sets[one.id], setting) for one in known] for known in (scenes, changed)]
-    for key in (*KEYS, *AREA_KEYS):
-        before, after = (chances(offered, known, kin, key) for known in goals)
+    for key in (*goal_blind.KEYS, *goal_blind.AREA_KEYS):
+        before, after = (goal_blind.chances(offered, known, kin, key) for known in goals)
         for place in kin[at]:
             np.testing.assert_array_equal(before[place], after[place])
 
@@ -193,12 +175,12 @@ def test_a_planted_tell_is_found(setting, is_drawn):
         needed = [one for one in offered if one.color == color] or offered[:1]
         scenes.append(scene(f"s{number}", tuple(needed)))
         sets[f"s{number}"] = CandidateSet(tuple(offered))
-    areas = {one.id: color_areas(one, "oblique") for one in scenes}
+    areas = {one.id: goal_blind.color_areas(one, "oblique") for one in scenes}
     assert all(areas[one.id] == {one.blocks[0].color: 1.0} for one in scenes)
     every = {name: Plan(tuple(range(1, 9))) for name in sets}
-    evenly = goal_blind_plans(scenes, sets, setting, [lambda _: None])
-    learned = goal_blind_plans(scenes, sets, setting)
-    seen = goal_blind_plans(scenes, sets, setting, AREA_KEYS, areas=areas)
+    evenly = goal_blind.goal_blind_plans(scenes, sets, setting, [lambda _: None])
+    learned = goal_blind.goal_blind_plans(scenes, sets, setting)
+    seen = goal_blind.goal_blind_plans(scenes, sets, setting, goal_blind.AREA_KEYS, areas=areas)
     found = {True: seen, False: learned}[is_drawn]
     others = [every, evenly, learned] if is_drawn else [every, evenly]
     assert plans_f1(scenes, sets, found, setting) > 0.8

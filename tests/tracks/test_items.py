@@ -2,6 +2,7 @@
 
 import asyncio
 import math
+from dataclasses import replace
 from itertools import pairwise, permutations
 
 import pytest
@@ -15,11 +16,15 @@ from phyblock.tracks.base import fair_order, in_order, presented, spread
 from phyblock.tracks.difficulty import MEASURES, distractor_distance, log_orders
 from tests.shipped import TASKS
 from tests.tracks.conftest import track_of
-from tests.workspace import call, plan_text
+from tests.workspace import call
 
 SIZES = st.lists(st.integers(1, 200), min_size=1, max_size=4)
 seeds = st.integers(0, 2**31 - 1)
-plans = st.lists(st.integers(-1, 18), max_size=8)
+
+
+@pytest.fixture(scope="module")
+def track():
+    return track_of("step_planning", steps={"physics": "off"})
 
 
 def stratified(sizes, limit):
@@ -54,14 +59,13 @@ def test_the_first_positions_are_spread(size, data):
 
 
 @given(seeds)
-def test_an_order_has_every_candidate_once_and_is_that_of_scene_and_seed(tasks, seed):
+def test_an_order_has_every_candidate_once_and_is_that_of_scene_and_seed(track, tasks, seed):
     orders = [presented(task, seed, "shuffled").order for task in tasks]
     for task, order in zip(tasks, orders, strict=True):
         assert sorted(order) == list(range(1, len(task.candidates) + 1))
         shown = presented(task, seed, "shuffled")
         assert [shown.candidates[n] for n in range(1, 17)] == [task.candidates[n] for n in order]
-        about = _track("full_planning").about(shown)
-        assert about == {"shown": {"order": list(order), "blind": False}}
+        assert track.about(shown) == {"shown": {"order": list(order), "blind": False}}
     assert len(set(orders)) == len(orders)
 
 
@@ -81,32 +85,10 @@ def in_file(task, steps):
     return [task.order[n - 1] if 1 <= n <= len(task.order) else n for n in steps]
 
 
-@given(st.integers(0, 4), seeds, plans)
-def test_a_plan_is_worth_the_same_in_either_numbering(tasks, place, seed, plan):
-    task, track = tasks[place], _track("full_planning")
-    shown = presented(task, seed, "shuffled")
-    here = track.judge(shown, plan_text(*plan)).fields
-    meant = in_file(shown, here["parse"]["plan"])
-    again = track.judge(task, plan_text(*meant)).fields
-    assert here["scores"] == again["scores"]
-    named = [shown.candidates[n] for n in here["parse"]["plan"]]
-    assert named == [task.candidates[n] for n in meant]
-
-
-_TRACKS = {}
-
-
-def _track(name):
-    if name not in _TRACKS:
-        more = {"steps": {"physics": "off"}} if name == "step_planning" else {}
-        _TRACKS[name] = track_of(name, **more)
-    return _TRACKS[name]
-
-
 @given(st.integers(0, 4), seeds, st.lists(st.integers(-1, 18), max_size=5))
-def test_an_episode_goes_the_same_in_either_numbering(tasks, place, seed, moves):
+def test_an_episode_goes_the_same_in_either_numbering(track, tasks, place, seed, moves):
     async def play(task, steps):
-        episode = _track("step_planning").start(task, 0, {}, with_messages=False)
+        episode = track.start(task, 0, {}, with_messages=False)
         for step in steps:
             if await episode.request() is None:
                 break
@@ -146,13 +128,8 @@ def test_numbers_are_within_their_bounds_and_tell_scenes_apart():
         assert 0 < numbers["blind"] < 1
         assert 1 <= numbers["distractor"] <= 3
         assert 1 <= numbers["depth"] <= numbers["blocks"] == len(task.scene)
-    needed = tuple(
-        {
-            block.look: Candidate(block.type, block.color, block.euler_deg)
-            for block in TASKS[0].scene.blocks
-        }.values()
-    )
-    alone = type(TASKS[0])(TASKS[0].scene, CandidateSet(needed))
+    needed = {b.look: Candidate(b.type, b.color, b.euler_deg) for b in TASKS[0].scene.blocks}
+    alone = replace(TASKS[0], candidates=CandidateSet(tuple(needed.values())))
     assert distractor_distance(alone) == 3
 
 

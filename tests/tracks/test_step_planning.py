@@ -4,6 +4,7 @@ import asyncio
 import functools
 import json
 import zlib
+from dataclasses import replace
 from typing import get_args
 
 import numpy as np
@@ -21,27 +22,24 @@ from phyblock.tracks.step_planning import ENDINGS, STEP_RULES, Feedback, PastSte
 from phyblock.types import SETTINGS
 from tests.parsing.test_replies import ROWS
 from tests.shipped import TASKS, official_tasks
+from tests.sim.structures import tower as stacked
 from tests.tracks.conftest import seesaw, track_of
 
 OPEN = {"max_failures": None, "max_repeats": None}
 
 
-def made(form="text", shop=None, **steps):
-    """The track; nothing is simulated unless that is asked for."""
-    return _made(form, shop, json.dumps({"physics": "off", **steps}))
-
-
 @functools.cache
-def _made(form, shop, steps):
-    fields = {"answer_format": form, "steps": json.loads(steps)}
-    return track_of("step_planning", TASKS[:1], shop, **fields)
+def made(form="text", **steps):
+    """The track; nothing is simulated unless that is asked for."""
+    fields = {"answer_format": form, "steps": {"physics": "off", **steps}}
+    return track_of("step_planning", TASKS[:1], **fields)
 
 
 def tower(*colors):
     """Cubes one on another; candidates are five colors of cube, and a red arch that is no use."""
     blocks = tuple(
-        Block(i, "cube", c, (0, 0, 0.05 * i - 0.025), (0, 0, 0), (i - 1,) if i > 1 else (), i)
-        for i, c in enumerate(colors, 1)
+        replace(one, color=color, depend=(i - 1,) if i > 1 else (), layer=i)
+        for i, (one, color) in enumerate(zip(stacked(len(colors)), colors, strict=True), 1)
     )
     cubes = [Candidate("cube", c, (0, 0, 0)) for c in ("red", "yellow", "blue", "green", "orange")]
     arch = Candidate("arch", "red", (0, 0, 0))
@@ -149,10 +147,9 @@ def test_limits_end_an_episode(limits, agent, ending, steps):
 
 def test_no_hostile_reply_stops_an_episode():
     """Each of them has its named outcome, and what follows is played as if it had not been."""
-    allowed = {*MOVE_OUTCOMES, *MOVE_PROBLEMS, "done"}
     for _, _, text in ROWS:
         fields, _ = play(tower("red", "blue"), scripted(text, "Move(1)", "Move(3)"))
-        assert set(fields["outcomes"]) <= allowed, text
+        assert set(fields["outcomes"]) <= {*MOVE_OUTCOMES, *MOVE_PROBLEMS, "done"}, text
         expected = "done" if fields["outcomes"][0] == "done" else "completed"
         assert fields["ending"] == expected, text
         json.dumps(fields, allow_nan=False, default=str)
@@ -241,15 +238,6 @@ def test_runs_of_failures_end_an_episode(moves, most_failures, most_repeats):
     assert fields["ending"] in (wanted, "completed")
 
 
-def test_outlines_are_as_many_as_an_episode_can_have():
-    task, rules = tower("red", "blue"), ({}, {"max_steps": 1})
-    assert [len(list(made(**one).outlines(task))) for one in rules] == [4, 1]
-
-
-def pictures(message):
-    return [part.data for part in message.parts if isinstance(part, Image)]
-
-
 @pytest.mark.parametrize("feedback", get_args(Feedback))
 def test_feedback_tells_no_more_than_it_may(feedback):
     outcomes = [*MOVE_OUTCOMES, *MOVE_PROBLEMS]
@@ -271,7 +259,7 @@ def test_pictures_of_states_are_drawn_and_kept(tmp_path):
         episode = track.start(task, 0, {}, with_messages=True)
         seen = []
         while (request := await episode.request()) is not None:
-            seen.append(pictures(request.messages[1]))
+            seen.append([p.data for p in request.messages[1].parts if isinstance(p, Image)])
             move = request.subject.valid[0]
             episode.take(Reply(text=f"Move({move})"))
         return seen

@@ -101,6 +101,19 @@ def record(
     }
 
 
+def asked(number: int, subtask: str, given: str, seed: int = 0) -> dict[str, Any]:
+    """A question whose right answer is A, and what was answered."""
+    name = f"{subtask.lower()}-{number}"
+    return record("alpha", "000", seed) | {
+        "sample": f"vqa/alpha/{name}/s{seed}",
+        "track": "vqa",
+        "key": name,
+        "question": {"id": name, "subtask": subtask, "category": "", "rotation": 0},
+        "parse": {"rule": "letter", "letters": given},
+        "answer": {"right": "A", "given": given, "correct": given == "A"},
+    }
+
+
 def run_of(records: Iterable[Mapping[str, Any]], facts: Mapping[str, Any]) -> Run:
     read = ((known_records().validate_python(one), 0) for one in records)
     told = Manifest.model_validate(dict(facts))

@@ -115,19 +115,6 @@ def test_every_text_of_the_page_is_escaped_and_only_our_script_may_run(tmp_path)
     assert not re.search(r"https?://(?!www\.w3\.org/2000/svg)|@import", page)
 
 
-def test_a_report_is_replaced_as_a_whole(tmp_path):
-    empty = Report(write_run(tmp_path / "run", [], manifest()))
-    assert empty.index["rows"]["item"] == []
-    assert set(map(tuple, empty.index["starts"].values())) == {()}
-    second = Report(
-        write_run(tmp_path / "run", [record("beta", scores=[score(0, 1, 2)])], manifest())
-    )
-    assert second.folder != empty.folder
-    assert not empty.folder.exists()
-    index = second.index
-    assert (index["rows"]["entry"], index["rows"]["score"]) == ([1], [0.0])
-
-
 def test_scenes_are_drawn_from_where_they_are_and_from_no_other_data(workspace, tmp_path):
     workspace.write_suite(models=["oracle"])
     workspace.completed()
