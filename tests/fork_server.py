@@ -18,7 +18,7 @@ import subprocess
 import sys
 import tempfile
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from multiprocessing import forkserver, get_context
 from multiprocessing.connection import Connection
@@ -62,16 +62,6 @@ class Done:
             elif found:
                 found[-1] += "\n" + line
         return found
-
-
-def small_files_only(limit_bytes: int) -> Callable[[], None]:
-    """Return a first call of a process, after which it can write no larger file."""
-
-    def apply() -> None:
-        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (limit_bytes, limit_bytes))
-
-    return apply
 
 
 def killed(marks: Path, times: int) -> str:
@@ -123,12 +113,10 @@ class Forked:
         self.stdout.close()
         self.stderr.close()
 
-    @property
-    def returncode(self) -> int | None:
-        return self._process.exitcode
-
     def poll(self) -> int | None:
         return self._process.exitcode
+
+    returncode = property(poll)
 
     def wait(self, timeout: float = 300) -> int:
         return _code(self._process, timeout)
@@ -198,8 +186,9 @@ def _become(order: Mapping[str, Any], ends: Sequence[Connection]) -> NoReturn:
     os.environ.clear()
     os.environ.update(order["env"])
     tempfile.tempdir = None
-    if order["bytes_left"] is not None:
-        small_files_only(order["bytes_left"])()
+    if (bytes_left := order["bytes_left"]) is not None:
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (bytes_left, bytes_left))
     if len(ends) > 2:
         sys.dont_write_bytecode = True
         resource.setrlimit(resource.RLIMIT_AS, (_MOST_MEMORY_BYTES, _MOST_MEMORY_BYTES))

@@ -11,7 +11,6 @@ import subprocess
 import sys
 import warnings
 import zipfile
-from collections.abc import Callable
 
 import pytest
 import yaml
@@ -23,13 +22,13 @@ from phyblock.errors import DataError, StoreError
 from phyblock.records.files import MANIFEST, RECORDS, Manifest, known_records
 from phyblock.run.manifest import portable_manifest
 from phyblock.text import hex_digest
+from tests.data.broken import with_value
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.web.factory import manifest, record
-from tests.workspace import SCENES, Raw, Workspace, questions, write_questions
+from tests.workspace import SCENES, Workspace, questions, write_questions
 
 SUBTASKS = ["SH", "OR"]
-Change = Callable[[list[Raw], Raw], None]
 
 
 @pytest.fixture(scope="module")
@@ -53,11 +52,6 @@ def made(new_workspace):
 
 def folders(made):
     return [made.root / "data", made.root / "questions"]
-
-
-def refused(path, data, error=StoreError, match=""):
-    with pytest.raises(error, match=match), opened_bundle(path, data):
-        pytest.fail("it was taken")
 
 
 def contents(made, folder):
@@ -131,26 +125,18 @@ def test_samples_that_were_left_out_are_counted(made, tmp_path):
     assert "19 of 20 expected samples: the run is not complete" in done.out
 
 
-def of_track(records, track, model="random"):
-    return next(r for r in records if r["track"] == track and r["model"] == model)
-
-
-def put(place, value, track="", model="random"):
-    """A change of one value: in the first record of a track and model, or in the manifest."""
+def put(place, value, track=""):
+    """A change of one value: in the first record of the baseline in a track, or the manifest."""
 
     def change(records, manifest):
-        node = of_track(records, track, model) if track else manifest
-        *above, last = (int(part) if part.isdigit() else part for part in place.split("."))
-        for part in above:
-            node = node[part]
-        node[last] = value
+        mine = (n for n, r in enumerate(records) if (r["track"], r["model"]) == (track, "random"))
+        if track:
+            number = next(mine)
+            records[number] = with_value(records[number], place, value)
+        else:
+            manifest |= with_value(manifest, place, value)
 
     return change
-
-
-def _score(records, _):
-    score = of_track(records, "full_planning")["scores"][0]
-    score["tp"], score["fp"] = score["tp"] + score["fp"], 0
 
 
 def _answer(records, _):
@@ -175,7 +161,7 @@ def _no_models(records, manifest):
 
 
 FORGED = {
-    "score": (_score, "does not verify"),
+    "score": (put("scores.0.tp", 4, "full_planning"), "does not verify"),
     "answer": (_answer, RECORDS),
     "turn": (_turn, RECORDS),
     "twice": (lambda records, _: records.append(records[0]), "jsonl:21: does not verify"),
@@ -192,7 +178,9 @@ FORGED = {
 @pytest.mark.parametrize("name", FORGED)
 def test_what_does_not_follow_from_the_replies_is_refused(made, tmp_path, name):
     change, said = FORGED[name]
-    refused(forged(made, tmp_path / "forged", change), folders(made), match=f"forged.zip.*{said}")
+    path = forged(made, tmp_path / "forged", change)
+    with pytest.raises(StoreError, match=f"forged.zip.*{said}"), opened_bundle(path, folders(made)):
+        pytest.fail("it was taken")
 
 
 def test_what_is_not_changed_is_made_here_to_the_byte(made, tmp_path):
@@ -204,11 +192,9 @@ def test_what_is_not_changed_is_made_here_to_the_byte(made, tmp_path):
 
 
 def test_data_are_never_looked_for_where_a_bundle_says(made, tmp_path):
-    def change(_, manifest):
-        manifest["dataset"] |= {"root": "/proc", "name": "../../.."}
-
-    path = forged(made, tmp_path / "forged", change)
-    refused(path, [], DataError, "which a bundle does not hold")
+    path = forged(made, tmp_path / "forged", put("dataset.root", "/proc"))
+    with pytest.raises(DataError, match="which a bundle does not hold"), opened_bundle(path, []):
+        pytest.fail("it was taken")
 
 
 SOUND = with_digests(

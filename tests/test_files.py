@@ -1,17 +1,15 @@
 """Files are read within bounds, written whole, and never over what the user made."""
 
 import contextlib
-import io
 import json
 import os
-import struct
 import zlib
 from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from PIL import Image, PngImagePlugin
+from PIL import PngImagePlugin
 
 from phyblock.errors import DataError, StoreError
 from phyblock.files import (
@@ -25,7 +23,7 @@ from phyblock.files import (
     write_named,
     writing,
 )
-from tests.fuzz.strategies import PICTURES, png_header
+from tests.fuzz.strategies import PICTURES, chunk, encoded, png_header
 
 
 @given(st.binary() | st.text())
@@ -127,16 +125,6 @@ def test_only_files_are_read_and_up_to_the_limit(tmp_path):
         read_bytes(tmp_path)
 
 
-def encoded(format_name, size=(64, 32), mode="RGB"):
-    buffer = io.BytesIO()
-    Image.linear_gradient("L").resize(size).convert(mode).save(buffer, format_name)
-    return buffer.getvalue()
-
-
-def chunk(name, body):
-    return struct.pack(">I", len(body)) + name + body + struct.pack(">I", zlib.crc32(name + body))
-
-
 def with_chunk(png, name, body):
     """The PNG with another chunk behind its header."""
     return png[:33] + chunk(name, body) + png[33:]
@@ -144,14 +132,12 @@ def with_chunk(png, name, body):
 
 BOMB = zlib.compress(b"x" * (PngImagePlugin.MAX_TEXT_CHUNK + 1))
 GOOD = {name: encoded(name) for name in ("PNG", "JPEG", "GIF", "WEBP")}
+UNREADABLE = "is not a readable picture: "
 BAD = {
-    "eps": (
-        b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 90 90\nshowpage\n",
-        "is not a readable picture: ",
-    ),
-    "bmp": (encoded("BMP"), "is not a readable picture: "),
-    "tiff": (encoded("TIFF"), "is not a readable picture: "),
-    "text": (b"no picture", "is not a readable picture: "),
+    "eps": (b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 90 90\nshowpage\n", UNREADABLE),
+    "bmp": (encoded("BMP"), UNREADABLE),
+    "tiff": (encoded("TIFF"), UNREADABLE),
+    "text": (b"no picture", UNREADABLE),
     "nothing": (b"", "an empty file"),
     "dot": (encoded("PNG", (1, 1)), "1 x 1 pixels"),
     "thin": (encoded("PNG", (64, 1)), "64 x 1 pixels"),

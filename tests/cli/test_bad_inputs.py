@@ -172,12 +172,22 @@ INPUTS = (
     Bad("limit", options("--limit", "0"), ("--limit", "0 is not in the range")),
     Bad("verb", command("rum"), ("rum", "run")),
     Bad("validate", many_files, (), messages=3),
+    # What a server of one's own has is known to nobody, nor what a direct transport asks for.
+    Bad("validate-models",
+        file("models.yaml", "far: {replay: gone}\nodd: opnai/gpt-4o\n"
+             "own: {id: hosted_vllm/x, api_base: 'http://127.0.0.1:9/v1'}\n"
+             "straight: {id: My/x, api_base: 'http://127.0.0.1:9/v1', transport: direct}\n",
+             "validate", "models.yaml"),
+        ("models.yaml:1:7: far.replay: recordings not found",
+         "models.yaml:2:6: odd: has an unknown provider", "did you mean openai?"), messages=2),
     # A file that is there and cannot be read, for root too.
     Bad("validate-locked", command("validate", "/proc/self/mem"), ("mem: cannot be read: ",)),
     Bad("validate-data", pipe("data/scenes.jsonl", "validate", "data"), ("is not a regular file",)),
     Bad("run-long", command("run", "suite.yaml", "--models-file", LONG), ("no such models file",)),
     Bad("init", command("init", "."), ("models.yaml", "is already there")),
     Bad("no-png", checkout, ("scene 000: images.source", "has no picture", "render")),
+    Bad("varied", models_text("old: {replay: out}\n", "--models", "old",
+                              "--set", "vary.repeats=2"), ("cannot be varied",)),
     Bad("no-rule", options("--models", "repeat"), ("repeat", "has no rule for full_planning")),
     Bad("engine", command(*FRESH, "--models", "random", "--set", "tracks=[step_planning]"),
         ("PHYBLOCK_PHYSICS: is not known", "found: bullet", "allowed: "),

@@ -39,30 +39,21 @@ add_baseline("full_planning", "backwards", backwards)
 """
 
 
-@pytest.fixture
-def suite(workspace):
+def test_a_module_is_loaded_by_its_name_or_by_an_entry_point(workspace):
     workspace.write_suite(models=["backwards"])
     (workspace.root / "mine.py").write_text(PLUGIN, encoding="utf-8")
-    return workspace
-
-
-def test_a_baseline_of_a_module_is_run_and_shown(suite):
-    assert suite.run().code == 2
-    words = ("run", "suite.yaml", "--out", suite.out, "--no-report")
-    suite.does("--plugin", "mine", *words, fresh=True)
-    assert {record["model"] for record in suite.records()} == {"backwards"}
-    assert {tuple(record["parse"]["plan"]) for record in suite.records()} == {(16,)}
-
-
-def test_an_entry_point_is_loaded_without_being_named(suite):
-    about = suite.root / "mine-1.0.dist-info"
+    words = ("run", "suite.yaml", "--out", "named", "--no-report")
+    workspace.does("--plugin", "mine", *words, fresh=True)
+    about = workspace.root / "mine-1.0.dist-info"
     about.mkdir()
     (about / "METADATA").write_text("Metadata-Version: 2.1\nName: mine\nVersion: 1.0\n")
     (about / "entry_points.txt").write_text("[phyblock.plugins]\nmine = mine\n")
-    path = f"{suite.env['PYTHONPATH']}:{suite.root}"
-    done = suite.completed(env={"PYTHONPATH": path}, fresh=True)
-    (suite.root / "mine.py").write_text("1 / 0\n", encoding="utf-8")
-    done = suite.run(env={"PYTHONPATH": path}, fresh=True)
+    path = f"{workspace.env['PYTHONPATH']}:{workspace.root}"
+    workspace.completed(env={"PYTHONPATH": path}, fresh=True)
+    plans = {tuple(record["parse"]["plan"]) for record in workspace.records()}
+    assert plans == {(16,)}
+    (workspace.root / "mine.py").write_text("1 / 0\n", encoding="utf-8")
+    done = workspace.run(env={"PYTHONPATH": path}, fresh=True)
     assert done.code == 2
     assert "plugin mine: cannot be imported: ZeroDivisionError" in done.err
     assert "mine.py:1" in done.err

@@ -90,26 +90,6 @@ def is_option(verb, *words):
     return words[-1] in known | {"--help"}
 
 
-def test_missing_recordings_and_unknown_providers_are_found(workspace):
-    models = {
-        "far": {"replay": "./nowhere"},
-        "odd": {"id": "opnai/gpt-4o", "groups": ["mine"]},
-        "own": {"id": "hosted_vllm/x", "api_base": "http://localhost:1/v1"},
-        "straight": {"id": "My/x", "api_base": "http://localhost:1/v1", "transport": "direct"},
-    }
-    workspace.write_yaml("models.yaml", models)
-    workspace.write_suite(models=["group:mine", "own", "straight"], seeds=[0])
-    done = workspace.phyblock("validate", "models.yaml", "suite.yaml")
-    assert done.code == 2
-    assert "models.yaml:2:11: far.replay: recordings not found" in done.err
-    # Of the suite its own models alone are looked at.
-    assert done.err.count("far.replay") == 1
-    assert done.err.count("models.yaml:4:7: odd.id: has an unknown provider") == 2
-    assert "did you mean openai?" in done.err
-    assert "own.id" not in done.err
-    assert "straight.id" not in done.err
-
-
 @pytest.mark.parametrize(
     "model", ["hosted_vllm/x", "openai/new", "gemini/gemini-2.5-pro", "anthropic/claude-unheard-of"]
 )

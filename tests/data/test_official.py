@@ -40,9 +40,7 @@ def candidates_path(root):
 
 
 def change(path, field, value):
-    raw = json.loads(path.read_text(encoding="utf-8"))
-    changed = with_value({"root": raw}, f"root.{field}", value)["root"]
-    path.write_text(json.dumps(changed), encoding="utf-8")
+    path.write_text(json.dumps(with_value(json.loads(path.read_text()), field, value)))
 
 
 def test_both_formats_say_the_same_and_what_only_official_files_have_is_read(tmp_path):
@@ -52,10 +50,8 @@ def test_both_formats_say_the_same_and_what_only_official_files_have_is_read(tmp
     (task,) = official.tasks
     assert (task.scene.look_at_m, task.composite, task.scene.parents) == (None, None, ("s1",))
     # A level-2 scene counts in level 1 too; declared layers are taken as they are.
-    for field, value in (
-        *(("level", 2), ("combined", "080_092"), ("lookat_pos", [0, 0, 0.1])),
-        ("blocks.1.layer", 5),
-    ):
+    extra = {"level": 2, "combined": "080_092", "lookat_pos": [0, 0, 0.1], "blocks.1.layer": 5}
+    for field, value in extra.items():
         change(goal_path(tmp_path), field, value)
     picture = tmp_path / "data" / "SCENEs_400_Goal_and_Cand_Imgs_resized" / "s1.png"
     picture.parent.mkdir()
@@ -140,25 +136,10 @@ def test_the_official_scenes(official_checkout):
         assert len(task.scene.parents) == (1 if task.scene.id in base else 2)
 
 
-COLOR = {
-    "scene_id": "t1",
-    "question": "What is the color of the block on top?",
-    "options": ["red", "blue", "green", "yellow"],
-    "answer": "B",
-}
-NEXT = {
-    "scene_id": "t2",
-    "question": "What comes next?",
-    "options": ["<img1>", "<img2>", "<img3>", "<img4>"],
-    "answer": "<img3>",
-}
-
-
-def write(folder, name, content):
-    folder.mkdir(parents=True, exist_ok=True)
-    text = content if isinstance(content, str) else json.dumps(content, indent=2)
-    (folder / name).write_text(text, encoding="utf-8")
-    return folder
+COLOR = {"scene_id": "t1", "question": "What color is on top?", "answer": "B"}
+COLOR["options"] = ["red", "blue", "green", "yellow"]
+NEXT = {"scene_id": "t2", "question": "What comes next?", "answer": "<img3>"}
+NEXT["options"] = [f"<img{number}>" for number in range(1, 5)]
 
 
 def draw(folder, *names):
@@ -169,9 +150,12 @@ def draw(folder, *names):
 
 
 def test_texts_pictures_and_orders_are_read(tmp_path, towers):
-    write(tmp_path, "color.json", [COLOR, {**COLOR, "id": "mine", "answer": "blue"}])
-    write(tmp_path, "PD.json", [NEXT])
-    write(tmp_path, "Ordering.json", [{**NEXT, "answer": "CABD"}])
+    for name, content in {
+        "color.json": [COLOR, {**COLOR, "id": "mine", "answer": "blue"}],
+        "PD.json": [NEXT],
+        "Ordering.json": [{**NEXT, "answer": "CABD"}],
+    }.items():
+        (tmp_path / name).write_text(json.dumps(content))
     draw(tmp_path, *(f"pd-001/img{i}.png" for i in range(1, 5)), "t1.png")
     draw(tmp_path, *(f"or-001/img{i}.jpg" for i in range(1, 5)))
     found = {task.key: task for task in read_official_questions(tmp_path, towers).tasks}
@@ -207,7 +191,7 @@ FAULTS = [
 def test_each_fault_is_one_error_with_file_and_place(tmp_path, towers, name, content, said):
     with pytest.raises(DataError, match="holds no question files"):
         read_official_questions(tmp_path, towers)
-    write(tmp_path, name, content)
+    (tmp_path / name).write_text(content if content == "{" else json.dumps(content))
     with pytest.raises(DataError) as caught:
         read_official_questions(tmp_path, towers)
     (problem,) = caught.value.problems
@@ -258,8 +242,6 @@ def test_other_models_are_not_taken_for_published_ones(name):
 
 names = st.sampled_from([*ROWS, *SPELLINGS])
 dates = st.dates(date(2020, 1, 1), date(2030, 12, 31))
-
-
 FORMS = ["%Y-%m-%d", "%Y%m%d", "%Y_%m_%d", "%m-%d", "%m%d"]
 
 

@@ -65,27 +65,19 @@ def test_either_name_of_an_orientation_and_any_end_of_a_line_are_read(tmp_path):
 
 BROKEN_VALUES = [
     # path, value, field of the problem
-    ("id", 3, "id"),
-    ("id", "../s1", "id"),
-    ("id", "a\nb", "id"),
-    ("levels", [6], "levels"),
-    ("levels", [1, 3], "levels"),
+    *(("id", value, "id") for value in (3, "../s1", "a\nb")),
+    *(("levels", value, "levels") for value in ([6], [1, 3], [])),
     ("levels", [True], "levels[0]"),
-    ("levels", [], "levels"),
     ("parents", [3], "parents[0]"),
     ("parents", [], "parents"),
     ("blocks", [], "blocks"),
     ("blocks.1", [1], "blocks[1]"),
-    ("blocks.0.order", 0, "blocks[0].order"),
-    ("blocks.0.order", True, "blocks[0].order"),
-    ("blocks.1.order", 2.5, "blocks[1].order"),
-    ("blocks.1.order", 1, "blocks[1].order"),
-    ("blocks.0.order", 10_000, "blocks[0].order"),
+    *(("blocks.0.order", value, "blocks[0].order") for value in (0, True, 10_000)),
+    *(("blocks.1.order", value, "blocks[1].order") for value in (2.5, 1)),
     ("blocks.1.type", "arc", "blocks[1].type"),
     ("blocks.0.color", "pink", "blocks[0].color"),
-    ("blocks.0.layer", 0, "blocks[0].layer"),
+    *(("blocks.0.layer", value, "blocks[0].layer") for value in (0, 10**18)),
     ("blocks.1.layer", 1, "blocks[1].layer"),
-    ("blocks.0.layer", 10**18, "blocks[0].layer"),
     ("blocks.0.position", [0, 0, float("nan")], ""),
     ("blocks.0.position", [0, 0, 1e999], ""),
     ("blocks.0.position", [0, 0, "1"], "blocks[0].position[2]"),
@@ -93,9 +85,7 @@ BROKEN_VALUES = [
     ("blocks.0.position", [101, 0, 0], "blocks[0].position[0]"),
     ("blocks.1.euler", [0, 0, True], "blocks[1].euler[2]"),
     ("blocks.1.euler", [0, 0, 1e9], "blocks[1].euler[2]"),
-    ("blocks.1.depend", [7], "blocks[1].depend"),
-    ("blocks.1.depend", [], "blocks[1].depend"),
-    ("blocks.1.depend", [2], "blocks[1].depend"),
+    *(("blocks.1.depend", value, "blocks[1].depend") for value in ([7], [], [2])),
     ("blocks.0.depend", [2], "blocks[0].depend"),
     ("blocks.1.depend", [10**18], "blocks[1].depend[0]"),
     ("candidates", [], "candidates"),
@@ -125,17 +115,14 @@ def test_a_missing_field_is_said_once(tmp_path):
 
 
 def test_everything_that_is_wrong_is_said_at_once(tmp_path):
-    first = with_value(with_value(SCENE, "levels", [9]), "blocks.0.depend", [2])
-    first = with_value(first, "candidates.0.color", "pink")
+    first = SCENE
+    for at, value in (("levels", [9]), ("blocks.0.depend", [2]), ("candidates.0.color", "pink")):
+        first = with_value(first, at, value)
     second = {**with_value(SCENE, "blocks.1.layer", 7), "id": "s2"}
     third = {**SCENE, "id": "s3"}
     found = problems_of(write_scenes(tmp_path, first, second, third, third))
-    assert [(p.where.rpartition(":")[2], p.field) for p in found] == [
-        ("1", "levels"),
-        ("1", "blocks[0].depend"),
-        ("1", "candidates[0].color"),
-        ("2", "blocks[1].layer"),
-        ("4", "id"),
+    assert [f"{p.where.rpartition(':')[2]} {p.field}" for p in found] == [
+        *("1 levels", "1 blocks[0].depend", "1 candidates[0].color", "2 blocks[1].layer", "4 id")
     ]
     assert "jsonl:3" in found[-1].message
     (tmp_path / "scenes.jsonl").write_text("x\n" * 200_000)

@@ -5,7 +5,6 @@ from collections.abc import Callable
 
 import pytest
 
-from tests.fuzz.laws import Bench
 from tests.fuzz.strategies import FAULTS, INPUTS, SEED
 from tests.workspace import SCENES, Workspace, questions, vqa_suite, write_questions
 
@@ -51,18 +50,6 @@ def ended(sound: Workspace, tmp_path_factory: pytest.TempPathFactory) -> Workspa
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text("precious", encoding="utf-8")
     return made
-
-
-@pytest.fixture(scope="session")
-def plain_bench(sound: Workspace, tmp_path_factory: pytest.TempPathFactory) -> Bench:
-    """Tries cases beside a sound suite."""
-    return Bench(sound, tmp_path_factory.mktemp("plain"))
-
-
-@pytest.fixture(scope="session")
-def runs_bench(ended: Workspace, tmp_path_factory: pytest.TempPathFactory) -> Bench:
-    """Tries cases beside finished runs."""
-    return Bench(ended, tmp_path_factory.mktemp("runs"))
 
 
 def pytest_report_header() -> str:

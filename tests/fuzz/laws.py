@@ -37,8 +37,7 @@ _LONGEST_SHOWN = 1500
 _KEPT_FILES = ("records.jsonl", "calls.jsonl")
 
 
-@dataclass(frozen=True)
-class Broken:
+class Broken(NamedTuple):
     """A law that was broken, and how. `kind` is the same for what has the same cause."""
 
     law: int
@@ -47,7 +46,6 @@ class Broken:
 
     @property
     def name(self) -> str:
-        """Law and kind."""
         return f"law {self.law}: {self.kind}"
 
 
@@ -161,36 +159,33 @@ class Case:
 
 
 class Bench:
-    """Tries cases in copies of the workspace `template`.
+    """Tries cases in a copy of the workspace `template`.
 
     `tally` counts them by exit code, `found` has the laws that were broken, by kind.
     """
 
-    def __init__(self, template: Workspace, root: Path) -> None:
-        self._template, self._folder = template.root, root / "here"
-        self._pictures = (template.cache / "pictures").resolve()
-        self._places = ("cache", "tmp", *map(str, shared_folders(self._pictures)))
-        self.tally: Counter[str] = Counter()
+    def __init__(self, template: Workspace, folder: Path, tally: Counter[str]) -> None:
+        self._template, self._folder, self.tally = template, folder / "here", tally
         self.found: dict[str, tuple[Case, Broken]] = {}
 
     def try_out(self, case: Case) -> None:
         """Note what the case broke; of cases that broke the same, the smallest is kept."""
-        shutil.copytree(self._template, self._folder, symlinks=True)
+        made = self._template.copied(self._folder)
         try:
-            (self._folder / "tmp").mkdir()
+            (made.root / "tmp").mkdir()
             for name, content in case.files.items():
-                _put(self._folder / name, content)
-            env = Workspace(self._folder, self._pictures).env
-            env = {**env, "TMPDIR": str(self._folder / "tmp")}
-            places = (*case.may_write, *self._places)
-            ended, found = watched(case.args, self._folder, env, places, case.lasting)
+                _put(made.root / name, content)
+            pictures = (made.cache / "pictures").resolve()
+            places = (*case.may_write, "cache", "tmp", *map(str, shared_folders(pictures)))
+            env = {**made.env, "TMPDIR": str(made.root / "tmp")}
+            ended, found = watched(case.args, made.root, env, places, case.lasting)
             self.tally["hangs" if ended.code is None else f"code {ended.code}"] += 1
             for broken in found:
                 known = self.found.get(broken.name)
                 if known is None or len(repr(case)) < len(repr(known[0])):
                     self.found[broken.name] = case, broken
         finally:
-            shutil.rmtree(self._folder)
+            shutil.rmtree(made.root)
 
     def told(self) -> str:
         """Every way in which a law was broken, with the smallest case that does it."""

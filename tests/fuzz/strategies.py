@@ -265,21 +265,24 @@ def png_header(width: int, height: int) -> bytes:
     """A PNG that claims a size and holds next to nothing."""
     header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
     chunks = ((b"IHDR", header), (b"IDAT", zlib.compress(b"\0" * 8)), (b"IEND", b""))
-    return b"\x89PNG\r\n\x1a\n" + b"".join(
-        struct.pack(">I", len(body)) + name + body + struct.pack(">I", zlib.crc32(name + body))
-        for name, body in chunks
-    )
+    return b"\x89PNG\r\n\x1a\n" + b"".join(chunk(name, body) for name, body in chunks)
 
 
-def _encoded(format_name: str) -> bytes:
+def chunk(name: bytes, body: bytes) -> bytes:
+    """A chunk of a PNG."""
+    return struct.pack(">I", len(body)) + name + body + struct.pack(">I", zlib.crc32(name + body))
+
+
+def encoded(format_name: str, size: tuple[int, int] = (64, 32)) -> bytes:
+    """A picture of this format."""
     buffer = io.BytesIO()
-    Image.linear_gradient("L").resize((64, 32)).convert("RGB").save(buffer, format_name)
+    Image.linear_gradient("L").resize(size).convert("RGB").save(buffer, format_name)
     return buffer.getvalue()
 
 
 @st.composite
 def _damaged(draw: st.DrawFn) -> bytes:
-    data = bytearray(_encoded(draw(st.sampled_from(["PNG", "JPEG", "GIF", "WEBP", "BMP", "TIFF"]))))
+    data = bytearray(encoded(draw(st.sampled_from(["PNG", "JPEG", "GIF", "WEBP", "BMP", "TIFF"]))))
     for _ in range(draw(st.integers(0, 3))):
         data[draw(st.integers(0, len(data) - 1))] = draw(st.integers(0, 255))
     return bytes(data[: draw(st.integers(1, len(data)))] if draw(st.booleans()) else data)

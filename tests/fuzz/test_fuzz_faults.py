@@ -54,7 +54,7 @@ _CELLS = [
 ]
 _PASSING = (
     *("429", "500", "reset", "cut", "html", "empty", "400"),
-    *tuple(name for name, fault in WIRE_FAULTS.items() if fault.ending != "unavailable"),
+    *(name for name, fault in WIRE_FAULTS.items() if fault.ending != "unavailable"),
 )
 _STOPPING = tuple(name for name, fault in WIRE_FAULTS.items() if fault.ending == "unavailable")
 _QUOTA = math.ceil(FAULTS / len(_CELLS))

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.data.broken import YAML_TEXTS, checkout_files, sound_scene
-from tests.fuzz.laws import Case
+from tests.fuzz.laws import Bench, Case
 from tests.fuzz.strategies import (
     CANDIDATES,
     JSON_TOKENS,
@@ -111,12 +111,12 @@ _ARGUMENTS = st.builds(
 ).filter(lambda args: args[0] != "init" and not {"generate", "render"} & set(args))
 
 
-_SOUND_REPLY = {
-    "id": "x",
-    "model": "m",
-    "choices": [{"finish_reason": "stop", "message": {"role": "assistant", "content": "1, 2"}}],
-    "usage": {"prompt_tokens": 10, "completion_tokens": 3, "total_tokens": 13},
-}  # fmt: skip
+def _reply(content):
+    choice = {"finish_reason": "stop", "message": {"role": "assistant", "content": content}}
+    usage = {"prompt_tokens": 10, "completion_tokens": 3, "total_tokens": 13}
+    return {"id": "x", "model": "m", "choices": [choice], "usage": usage}
+
+
 _STEPS = st.sampled_from(
     [
         *("Step1: Move block with index 1", "Step 2:", "Move(3)", "index", "1", "-1"),
@@ -127,15 +127,9 @@ _STEPS = st.sampled_from(
 )
 
 
-def _reply_with(pieces):
-    message = {"role": "assistant", "content": " ".join(pieces)}
-    body = {**_SOUND_REPLY, "choices": [{"finish_reason": "stop", "message": message}]}
-    return json.dumps(body).encode()
-
-
-_REPLY_FILES = broken(st.just(_SOUND_REPLY), JSON_TOKENS) | st.builds(
-    _reply_with, st.lists(_STEPS | _TEXTS, max_size=8)
-)
+_REPLY_FILES = broken(st.just(_reply("1, 2")), JSON_TOKENS) | st.lists(
+    _STEPS | _TEXTS, max_size=8
+).map(lambda pieces: json.dumps(_reply(" ".join(pieces))).encode())
 
 
 def _official(picture, candidates):
@@ -176,9 +170,8 @@ KINDS = {
     "places": st.builds(_place_case, _PLACES | _ELSEWHERE, st.booleans(), NOISE),
 }
 """Cases beside a sound suite, by what is bad about them."""
-_PERCENT = dict(zip(KINDS, (14, 12, 8, 10, 12, 8, 8, 6, 6, 6), strict=True))
+_PERCENT = dict(zip([*KINDS, "run folders"], (14, 12, 8, 10, 12, 8, 8, 6, 6, 6, 10), strict=True))
 """Their shares of all inputs."""
-_OF_RUNS_PERCENT = 10
 
 _OF_RUN = {
     "out": (
@@ -245,22 +238,17 @@ def _with_bad_line(path):
     return st.builds(joined, st.integers(0, len(lines) - 1), bad, endings)
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_bad_input(plain_bench, tallies, kind):
-    tally = tallies.setdefault(kind, Counter())
-    try_cases(plain_bench, KINDS[kind], _PERCENT[kind], tally)
-
-
-def test_bad_run_folder(runs_bench, ended, tallies):
-    tally = tallies.setdefault("run folders", Counter())
-    try_cases(runs_bench, run_cases(ended.root), _OF_RUNS_PERCENT, tally)
-
-
-def try_cases(bench, cases, percent, tally):
+@pytest.mark.parametrize("kind", [*KINDS, "run folders"])
+def test_bad_input(kind, request, tmp_path, tallies):
     """Draw cases, try each, and fail with all that was broken."""
-    bench.tally, bench.found = tally, {}
+    if kind in KINDS:
+        template, cases = request.getfixturevalue("sound"), KINDS[kind]
+    else:
+        template = request.getfixturevalue("ended")
+        cases = run_cases(template.root)
+    bench = Bench(template, tmp_path, tallies.setdefault(kind, Counter()))
 
-    @fuzzed(percent)
+    @fuzzed(_PERCENT[kind])
     @given(case=cases)
     def run(case):
         bench.try_out(case)

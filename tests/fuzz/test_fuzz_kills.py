@@ -108,9 +108,9 @@ def test_kills(workspace, tallies, track, count, options):
     with contextlib.ExitStack() as stack:
         servers = []
         for n in range(count):
-            faults = {"seed": 1 + SEED + n, "retry_after": "0", "latency_s": 0.03}
-            spread = Faults.spread(names, 0.15, **faults) if names else Faults(latency_s=0.03)
-            servers.append(stack.enter_context(Running(kind(spread, ledger=ledger))))
+            fields = {"seed": 1 + SEED + n, "retry_after": "0", "latency_s": 0.03}
+            faults = Faults.spread(names, 0.15, **fields)
+            servers.append(stack.enter_context(Running(kind(faults, ledger=ledger))))
         bases = [f"{server.url}/v1" for server in servers]
         for _ in range(rounds):
             # The order of the addresses may change.

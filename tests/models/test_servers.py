@@ -2,6 +2,7 @@
 
 import asyncio
 from collections import Counter
+from contextlib import ExitStack
 from dataclasses import dataclass
 
 import pytest
@@ -21,7 +22,7 @@ from phyblock.models.model import (
 from phyblock.records.record import Reply
 from tests.models.factory import ROUTES, answers, ask, make_model, make_request, with_fields
 from tests.models.test_limits import FakeTime
-from tests.servers.chassis import Faults, Running, kill, start
+from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat
 
 REFUSED = RetryableError("connection refused", sent="no")
@@ -224,19 +225,18 @@ def requests_of(count):
 def test_servers_that_die_in_the_middle_lose_nothing(route):
     servers = [OpenAIChat(Faults(latency_s=0.01), width=1) for _ in range(4)]
 
-    async def main():
-        started = [await start(server, 0) for server in servers]
-        config = at(*(f"http://127.0.0.1:{port}" for _, port in started), route=route)
+    async def main(running):
+        config = at(*(one.url for one in running), route=route)
         model = make_model(config, policy=RetryPolicy(base_s=0.01, max_wait_s=0.05))
         asking = asyncio.create_task(answers(model, *requests_of(120)))
         while sum(server.ended["ok"] for server in servers) < 40:
             await asyncio.sleep(0.005)
-        await kill(*(runner for runner, _ in started[1:]))
-        found = await asking
-        await started[0][0].cleanup()
-        return found
+        for one in running[1:]:
+            one.die()
+        return await asking
 
-    found = asyncio.run(main())
+    with ExitStack() as stack:
+        found = asyncio.run(main([stack.enter_context(Running(server)) for server in servers]))
     assert [type(answer) for answer in found] == [Reply] * 120
     # No sample was sent again but those that were under way at a server that died.
     asked = sum((server.by_sample for server in servers), Counter())

@@ -25,7 +25,6 @@ from phyblock.errors import (
     UnavailableError,
 )
 from phyblock.models import client
-from phyblock.models.client import shown
 from phyblock.models.model import RetryPolicy
 from phyblock.models.request import Image, Message, json_body, wire_messages
 from phyblock.parsing.answer import choice_form
@@ -206,22 +205,12 @@ def test_only_pictures_are_sent_as_pictures():
         wire_messages(request.messages, None)
 
 
-def asking(form):
-    return replace(make_request("017", 42), response_format=form.response_format)
-
-
-def test_the_schema_arrives_as_it_is_declared(wire):
-    form = plan_form(16)
-    seen = wire.arrived("direct", asking(form), response_format="always")
-    schema = {"name": "plan", "schema": form.schema, "strict": True}
-    assert seen.raw["response_format"] == {"type": "json_schema", "json_schema": schema}
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("form", [plan_form(16), move_form(16), choice_form("abcd", True)])
 def test_litellm_hands_every_schema_on(wire, form):
     def arrived(route):
-        return wire.arrived(route, asking(form), response_format="always")
+        asked = replace(make_request("017", 42), response_format=form.response_format)
+        return wire.arrived(route, asked, response_format="always")
 
     direct = arrived("direct").raw
     assert [arrived(route).raw for route in ("openai", "vllm")] == [direct, direct]
@@ -354,35 +343,34 @@ def test_a_server_that_never_answers_is_a_timeout(wire, route):
     assert server.requests == policy.attempts
 
 
-def test_keys_leave_an_error_before_it_is_cut():
-    for length in range(440, 520):
-        text = shown(f"{'x' * length}{KEY} and more", (KEY,))
-        assert len(text) <= 500
-        assert KEY[:4] not in text
-
-
 # Every named fault of a server.
 
+SERVERS_WORDS = {
+    "200-quota": "You exceeded your current quota",
+    "400-string": "Invalid value for messages",
+    "401-string": "Unauthorized",
+    "429-bare": "Too many requests",
+    "503": "Overloaded",
+    "redirect-nowhere": "it redirects, and no redirect is followed",
+    **dict.fromkeys(("200-code-401", "200-code-401-number"), "No auth credentials found"),
+    **dict.fromkeys(
+        ("200-code-429", "200-code-500", "200-code-object", "200-message-object"),
+        "Upstream is down",
+    ),
+    **dict.fromkeys(("200-code-huge", "200-error-string"), "Upstream is down"),
+}
+"""What stands in the error, by fault."""
 ENDINGS = {
     "reply": Reply,
     "retryable": RetryableError,
     "unavailable": UnavailableError,
     "sample": SampleError,
 }
-REDIRECTED = {
-    **ROUTES,
-    "xai": Route(OpenAIChat, "xai/m", "/v1", "litellm"),
-    "openrouter": Route(OpenAIChat, "openrouter/m", "/v1", "litellm"),
-}
 AS_LITELLM_READS = {
     **dict.fromkeys((name, "usage-true") for name in ("openai", "vllm", "anthropic", "gemini")),
     **dict.fromkeys(("anthropic", mode) for mode in ("usage-huge", "usage-fraction")),
 }
 """Counts that are none and that litellm takes for some: what it makes of them is what is known."""
-SERVERS_WORDS = {
-    name for name in WIRE_FAULTS if name.startswith(("200-code", "200-message", "200-error-s"))
-}
-Answers = dict[str, Reply | ModelError]
 
 
 def answers_to(route, server, url, faults):
@@ -390,14 +378,6 @@ def answers_to(route, server, url, faults):
 
     One model meets them all, as long as it is not stopped: no fault spoils what comes after it.
     """
-
-    async def one(model, mode):
-        server.faults = Faults(mode=mode)
-        try:
-            reply = await model.ask(make_request())
-        except ModelError as error:
-            return error
-        return reply
 
     def new(timeout_s):
         with pytest.MonkeyPatch.context() as patch:
@@ -409,7 +389,11 @@ def answers_to(route, server, url, faults):
         found = {}
         model, hasty = new(20.0), new(0.7)
         for mode in faults:
-            found[mode] = await one(hasty if mode == "drip" else model, mode)
+            server.faults = Faults(mode=mode)
+            try:
+                found[mode] = await (hasty if mode == "drip" else model).ask(make_request())
+            except ModelError as error:
+                found[mode] = error
             if isinstance(found[mode], UnavailableError):
                 await model.aclose()
                 model = new(20.0)
@@ -427,11 +411,10 @@ def test_every_fault_ends_as_it_must_after_one_request(wire, name):
     for mode, answer in answers.items():
         assert isinstance(answer, ENDINGS[WIRE_FAULTS[mode].ending]), (mode, answer)
         assert server.ended[mode] == 1, mode
-        told = str(answer) + repr(answer)
-        assert KEY not in told, mode
-        assert KEY[:8] not in told, mode
-        if mode in SERVERS_WORDS and name != "anthropic":
-            assert "Upstream is down" in told or "No auth credentials" in told, (mode, told)
+        assert KEY[:8] not in str(answer) + repr(answer), mode
+        if name != "anthropic" and mode in SERVERS_WORDS:
+            # Whichever transport it came through.
+            assert SERVERS_WORDS[mode] in str(answer), mode
         if mode.startswith("usage-") and (name, mode) not in AS_LITELLM_READS:
             usage = answer.usage
             counts = (usage.prompt_tokens, usage.completion_tokens, usage.reasoning_tokens)
@@ -443,34 +426,29 @@ def test_every_fault_ends_as_it_must_after_one_request(wire, name):
     assert "[key]" in echo.provider_model
 
 
-@pytest.mark.parametrize("name", REDIRECTED)
-def test_a_redirect_takes_nothing_anywhere(name):
-    route = REDIRECTED[name]
+@pytest.mark.parametrize(
+    "route",
+    [
+        *ROUTES.values(),
+        Route(OpenAIChat, "xai/m", "/v1", "litellm"),
+        Route(OpenAIChat, "openrouter/m", "/v1", "litellm"),
+    ],
+    ids=lambda route: f"{route.model_id}-{route.transport}",
+)
+def test_a_redirect_takes_nothing_anywhere(route):
     away = OpenAIChat()
     with Running(away) as elsewhere:
         there = elsewhere.url.replace("127.0.0.1", "localhost")
-        server = route.server(elsewhere=there)
-        with Running(server) as running:
+        with Running(route.server(elsewhere=there)) as running:
             modes = [mode for mode in WIRE_FAULTS if mode.startswith("redirect")]
-            answers = answers_to(route, server, running.url, modes)
+            answers = answers_to(route, running.server, running.url, modes)
     assert away.requests == 0
+    assert running.server.ended == dict.fromkeys(modes, 1)
     for mode, answer in answers.items():
         assert isinstance(answer, UnavailableError), mode
-        assert server.ended[mode] == 1, mode
         assert "is api_base the address" in str(answer)
         assert "h1dden" not in str(answer)
         assert "it redirects, and no redirect is followed" in str(answer)
-
-
-def test_both_transports_say_the_same_of_what_a_server_said(wire):
-    modes = ["200-quota", "200-code-object", "200-error-string", "400-string", "401-string"]
-    modes += ["429-bare", "503", "redirect-nowhere", "gzip-bomb", "reset-midway"]
-    told = []
-    for name in ("direct", "openai", "vllm", "gemini"):
-        # Addresses stand in some of the words.
-        answers = answers_to(ROUTES[name], *wire.at(name), modes)
-        told.append({mode: str(answer) for mode, answer in answers.items()})
-    assert told[1:] == [told[0]] * 3
 
 
 def unreachable(name, url, **fields):

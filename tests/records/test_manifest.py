@@ -1,8 +1,5 @@
 """`run.yaml` is read within bounds; only a run's own records are counted, and go on in it."""
 
-import shutil
-from pathlib import Path
-
 import pytest
 
 from phyblock.errors import StoreError
@@ -11,7 +8,7 @@ from phyblock.records.record import Call
 from phyblock.results.load import load_run
 from phyblock.run.rescore import rescore
 from tests.data.broken import YAML_TEXTS, plan_record
-from tests.workspace import read_lines, write_lines
+from tests.workspace import call
 
 IDENTITY = "5eed" * 16
 
@@ -81,41 +78,21 @@ def runs(new_workspace):
     return made
 
 
-READERS = {"load": load_run, "score": rescore}
+def goes_on(folder):
+    """Go on with the run of a workspace."""
+    return call("run", folder.parent / "suite.yaml", "--out", folder, "--no-report")
 
 
-@pytest.mark.parametrize("reader", READERS)
+@pytest.mark.parametrize("reader", [load_run, rescore, goes_on])
 def test_records_that_were_copied_in_are_not_counted(runs, tmp_path, reader):
-    folder = shutil.copytree(runs.out, tmp_path / "run")
-    READERS[reader](folder)
+    folder = runs.copied(tmp_path / "w").root / "out"
+    reader(folder)
     path = folder / "records.jsonl"
     with path.open("ab") as file:
         file.write((runs.root / "other" / "records.jsonl").read_bytes())
     before = path.read_bytes()
     with pytest.raises(StoreError) as caught:
-        READERS[reader](folder)
+        reader(folder)
     (problem,) = caught.value.problems
     assert (problem.where, problem.field) == (f"{path}:6", "run")
     assert path.read_bytes() == before
-
-
-def test_a_run_does_not_go_on_with_records_that_were_copied_in(runs, tmp_path):
-    whole = runs.out
-    runs.out = Path(shutil.copytree(whole, tmp_path / "run"))
-    try:
-        runs.completed()
-        path = runs.out / "records.jsonl"
-        shutil.copy(runs.root / "other" / "records.jsonl", path)
-        before = path.read_bytes()
-        done = runs.run()
-        assert done.code == 2
-        assert "records.jsonl:1: run: is of another run" in done.err
-        assert path.read_bytes() == before
-        lines = read_lines(whole / "records.jsonl")
-        lines[2] |= {"key": "t9", "scene": "t9", "sample": "full_planning/random/t9/s0"}
-        write_lines(path, lines)
-        done = runs.run()
-        assert done.code == 2
-        assert "records.jsonl:3: sample: is of another run" in done.err
-    finally:
-        runs.out = whole

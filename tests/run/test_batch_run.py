@@ -6,11 +6,8 @@ import re
 import signal
 import threading
 
-import pytest
-
 from tests.servers.batches import BatchFaults, OpenAIBatches
 from tests.servers.chassis import Running
-from tests.workspace import questions, write_questions
 
 POLLING = {"batch_poll_s": 0.05}
 
@@ -26,30 +23,6 @@ def prepare(workspace, url, **suite):
 def counted_once(server, samples):
     """Both seeds of an item ask the same where no seeds are sent."""
     return sum(server.asked.values()) == samples and len(set(server.asked.values())) == 1
-
-
-def test_all_tracks_of_one_turn_go_out_in_batches_at_half_the_price(workspace):
-    write_questions(workspace.root / "questions", questions(subtasks=["SH", "OR"], per_subtask=1))
-    with Running(OpenAIBatches()) as running:
-        tracks = {"tracks": ["full_planning", "vqa"]}
-        prepare(workspace, running.url, vqa={"path": "./questions"}, limit=2, seeds=[0], **tracks)
-        costs = []
-        for name in ("models.yaml", "singly.yaml"):
-            dry = workspace.run("--dry-run", "--models-file", name)
-            assert "4 calls, about $" in dry.out
-            costs += re.findall(r"^alpha .* \$([\d.]+)$", dry.out, re.MULTILINE)
-        batched, single = map(float, costs)
-        assert batched == pytest.approx(single / 2, abs=0.006)  # cents are shown
-        done = workspace.completed("--yes")
-        assert "waiting for batch batch-0 since" in done.out
-        assert counted_once(running.server, 4)
-        assert [len(made.requests) for made in running.server.made] == [4]
-        records = workspace.records()
-        assert len(records) == 4
-        for record in records:
-            reply = record["reply"]
-            assert (reply["batched"], reply["cached"]) == (True, False)
-            assert reply["cost_usd"] == pytest.approx((1000 * 2.5 + 40 * 10) / 1e6 / 2)
 
 
 def test_a_run_that_waits_is_stopped_and_goes_on_by_the_same_command(workspace):

@@ -166,24 +166,3 @@ def check_repeats(records, server):
         assert record["sample"] == f"full_planning/alpha/{record['scene']}/s0{end}"
         assert record["prompt"]["template"] == variant.get("prompt", "default")
         assert ("shown" in record) == ("candidate_order" in variant)
-
-
-def test_questions_and_episodes_vary_what_they_know(workspace):
-    """Episodes without a key; recordings were asked in one way."""
-    workspace.write_suite(
-        tracks=["step_planning"], levels=[4], vary={"view": ["oblique", "top"], "repeats": 2}
-    )
-    workspace.completed()
-    records = workspace.records()
-    assert len(records) == 2 * 4
-    oracle = [r for r in records if r["model"] == "oracle"]
-    assert {r["ending"] for r in oracle} == {"completed"}
-    ways = yaml.safe_load((workspace.out / "run.yaml").read_text())["variants"]
-    assert len({way["step_planning"]["pictures"] for way in ways.values()}) == 2
-    assert len({tuple(r["parse"]["plan"]) for r in records if r["model"] == "random"}) > 1
-    assert {r["factor"] for r in workspace.rows("sensitivity")} == {"view"}
-    workspace.scored()
-    workspace.write_yaml("models.yaml", {"old": {"replay": "./out"}})
-    refused = workspace.run("--models", "old", "--out", workspace.root / "other")
-    assert refused.code == 2
-    assert "cannot be varied" in refused.err

@@ -184,7 +184,7 @@ def test_episodes_are_billed_no_more_than_a_dry_run_expects(workspace):
 
 def test_a_run_without_a_limit_counts_once_there_is_one(workspace):
     with workspace.served(
-        OpenAIChat(Faults(server_error=0.5)),
+        OpenAIChat(Faults({"500": 0.5})),
         entry={"price": PRICE, "max_tokens": 100},
         seeds=[0, 1, 2, 3],
         limits={**TWICE, "max_attempts": 1},

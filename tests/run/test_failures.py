@@ -1,6 +1,5 @@
 """Failures of a provider and of the reply cache: retried, recorded by kind, said once."""
 
-import contextlib
 import sqlite3
 from collections import Counter
 
@@ -93,16 +92,6 @@ def prepare(workspace, server, at_once=1):
     return workspace.served(server, seeds=[0, 1, 2, 3], limits={"max_concurrency": at_once})
 
 
-@contextlib.contextmanager
-def locked(workspace):
-    """Hold the reply cache as another process would."""
-    path = workspace.cache / "replies.sqlite"
-    ReplyCache(path).close()
-    with contextlib.closing(sqlite3.connect(path, isolation_level=None)) as db:
-        db.execute("BEGIN IMMEDIATE")
-        yield
-
-
 @pytest.mark.parametrize("room", [3, SAMPLES - 1])
 def test_a_cache_that_takes_no_more_is_said_once_and_all_is_recorded(workspace, room):
     path = workspace.cache / "replies.sqlite"
@@ -142,11 +131,3 @@ def test_a_disk_that_takes_neither_replies_nor_records_ends_the_run_after_few_ca
         workspace.completed()
         assert server.requests <= asked + SAMPLES - kept
         assert len({record["sample"] for record in workspace.records()}) == SAMPLES
-
-
-@pytest.mark.slow
-def test_a_run_with_a_locked_cache_ends_as_without_one(workspace):
-    with prepare(workspace, OpenAIChat(), AT_ONCE) as server, locked(workspace):
-        done = workspace.completed()
-        assert done.out.count("database is locked") == 1
-        assert server.requests == SAMPLES

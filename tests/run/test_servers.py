@@ -83,8 +83,8 @@ class Parrot(OpenAIChat):
 
 @pytest.mark.parametrize("transport", ["direct", pytest.param("litellm", marks=pytest.mark.slow)])
 def test_keys_and_pictures_stay_off_the_disk(workspace, transport):
-    others = tuple((f"echo-key-{kind}", 0.04) for kind in ("in-reply", "json", "cut", "page"))
-    faults = Faults(0.1, 0.1, malformed=0.1, retry_after="0", others=others)
+    echoes = {f"echo-key-{kind}": 0.04 for kind in ("in-reply", "json", "cut", "page")}
+    faults = Faults({"429": 0.1, "500": 0.1, "html": 0.1, **echoes}, retry_after="0")
     kinds = {"talks": faults, "locked": Faults(mode="echo-key"), "refuses": Faults(mode="400")}
     servers = {name: Parrot(each) for name, each in kinds.items()}
     with (

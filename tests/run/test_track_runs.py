@@ -18,7 +18,7 @@ from phyblock.results.compare import compare
 from phyblock.results.load import load_run
 from phyblock.run.rescore import rescore
 from phyblock.sim.engine import ENGINES, described_engine, installed_engines
-from tests.servers.chassis import ISSUE_MIX, Faults, Running
+from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat, StepAgent, said, told_history
 from tests.sim.structures import counterweighted_beam
 from tests.tracks.conftest import raw_of
@@ -211,7 +211,8 @@ def test_the_server_sees_goal_candidates_current_picture_and_history(workspace):
 )
 def test_faults_change_nothing_and_every_request_is_an_attempt(workspace, kind, fields):
     found = []
-    for faults in (Faults(), replace(ISSUE_MIX, retry_after="0")):
+    mix = {"429": 0.1, "500": 0.05, "reset": 0.02, "cut": 0.005, "empty": 0.005}
+    for faults in (Faults(), Faults(mix, retry_after="0")):
         with prepare(workspace, kind(faults), **fields) as server:
             workspace.out = workspace.root / f"out{len(found)}"
             workspace.completed("--no-cache")

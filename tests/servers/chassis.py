@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import argparse
 import asyncio
+import base64
 import hashlib
 import json
 import threading
 from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Coroutine, Iterable
+from collections.abc import Coroutine, Mapping, Sequence
 from contextlib import AbstractAsyncContextManager, nullcontext
 from dataclasses import dataclass, field
 from typing import Any
@@ -32,50 +33,39 @@ ELSEWHERE = "http://localhost:9"
 class Faults:
     """Shares of requests that fail in each way, and how an answer comes otherwise.
 
-    `malformed` is spread over cut JSON, an HTML page with status 200, and a reply without choices.
-    `others` are further names with their shares; another `seed` draws other requests for each.
-    `mode` makes every request end in one way: a name of FAULTS or WIRE_FAULTS, or "401", "403",
-    "404", "quota", "400", "policy", "seed" (400 for a request with a seed), "echo-key", "length",
-    "filtered", "blank", "slow" (never answers).
+    Another `seed` draws other requests for each. `mode` makes every request end in one way. Ways
+    are the names of FAULTS (cut JSON, an HTML page with status 200, a reply without choices, ...)
+    and WIRE_FAULTS, "401", "403", "404", "quota", "400", "policy", "seed" (400 for a request with
+    a seed), "echo-key", "length", "filtered", "blank", "slow" (never answers).
     """
 
-    rate_limited: float = 0.0
-    server_error: float = 0.0
-    reset: float = 0.0
-    malformed: float = 0.0
+    shares: Mapping[str, float] = field(default_factory=dict)
     latency_s: float = 0.0
     retry_after: str = "1"
     mode: str = "ok"
-    others: tuple[tuple[str, float], ...] = ()
     seed: int = 0
 
     @classmethod
-    def spread(cls, names: Iterable[str], share: float, *, seed: int, **fields: Any) -> Faults:
+    def spread(cls, names: Sequence[str], share: float, **fields: Any) -> Faults:
         """Faults of which each of the names takes the same part of `share`."""
-        chosen = tuple(names)
-        return cls(others=tuple((n, share / len(chosen)) for n in chosen), seed=seed, **fields)
+        return cls({name: share / len(names) for name in names}, **fields)
 
     def draw(self, sample: str, nth: int) -> str:
         """The way in which the nth request of a sample ends."""
         if self.mode != "ok":
             return self.mode
-        drawn = f"{sample}|{nth}|{self.seed}" if self.seed else f"{sample}|{nth}"
-        number = int(hashlib.sha256(drawn.encode()).hexdigest(), 16)
-        share, kind = (number % 10**6) / 10**6, (number >> 64) % 3
-        for name, size in (
-            ("429", self.rate_limited),
-            ("500", self.server_error),
-            ("reset", self.reset),
-            (("cut", "html", "empty")[kind], self.malformed),
-            *self.others,
-        ):
+        drawn = hashlib.sha256(f"{sample}|{nth}|{self.seed}".encode()).hexdigest()
+        share = int(drawn, 16) % 10**6 / 10**6
+        for name, size in self.shares.items():
             if share < size:
                 return name
             share -= size
         return "ok"
 
 
-ISSUE_MIX = Faults(rate_limited=0.10, server_error=0.05, reset=0.02, malformed=0.01)
+def picture_part(kind: str, data: str) -> tuple[str, str]:
+    """MIME type and digest of a picture that arrived in base 64."""
+    return kind, hashlib.sha256(base64.b64decode(data)).hexdigest()
 
 
 @dataclass(frozen=True)
@@ -196,9 +186,7 @@ class LocalServer(ABC):
         if ending == "slow":
             await asyncio.sleep(3600)
         if ending == "html":
-            return web.Response(
-                text="<html><body>Bad gateway</body></html>", content_type="text/html"
-            )
+            return web.Response(text="<html>Bad gateway</html>", content_type="text/html")
         if ending == "cut":
             whole = json.dumps(self.reply(seen, "ok"))
             return web.Response(text=whole[: len(whole) // 2], content_type="application/json")
@@ -220,9 +208,8 @@ class LocalServer(ABC):
             "seed": (400, "Unrecognized request argument supplied: seed"),
         }[ending]
         headers = {"Retry-After": self.faults.retry_after} if ending == "429" else {}
-        return web.json_response(
-            self.error(status, ending, message), status=status, headers=headers
-        )
+        body = self.error(status, ending, message)
+        return web.json_response(body, status=status, headers=headers)
 
 
 class Running:
@@ -268,7 +255,7 @@ class Running:
         return self._runner is not None
 
     def die(self) -> None:
-        """End as a process that is killed."""
+        """End as a process that is killed: at once, its connections reset."""
         self._in_loop(self._die())
 
     def come_back(self) -> None:
@@ -279,25 +266,19 @@ class Running:
         asyncio.run_coroutine_threadsafe(work, self._loop).result(10)
 
     async def _die(self) -> None:
-        if self._runner is not None:
-            dying, self._runner = self._runner, None
-            await kill(dying)
+        if self._runner is None:
+            return
+        dying, self._runner = self._runner, None
+        for site in list(dying.sites):
+            await site.stop()
+        for connection in dying.server.connections:
+            if connection.transport is not None:
+                connection.transport.abort()
+        await dying.cleanup()
 
     async def _come_back(self) -> None:
         if self._runner is None:
             self._runner, _ = await start(self.server, self.port)
-
-
-async def kill(*runners: web.AppRunner) -> None:
-    """End servers as the death of their processes does: at once, their connections reset."""
-    for runner in runners:
-        for site in list(runner.sites):
-            await site.stop()
-        for connection in runner.server.connections:
-            if connection.transport is not None:
-                connection.transport.abort()
-    for runner in runners:
-        await runner.cleanup()
 
 
 async def start(server: LocalServer, port: int) -> tuple[web.AppRunner, int]:

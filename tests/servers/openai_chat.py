@@ -1,6 +1,5 @@
 """A server that speaks the OpenAI chat protocol: `python -m tests.servers.openai_chat --port 0`."""
 
-import base64
 import hashlib
 import json
 import re
@@ -9,7 +8,7 @@ from typing import Any
 
 from aiohttp import web
 
-from tests.servers.chassis import Faults, LocalServer, Seen, main
+from tests.servers.chassis import Faults, LocalServer, Seen, main, picture_part
 
 USAGE = {"prompt_tokens": 1000, "completion_tokens": 40, "total_tokens": 1040}
 _CODES = {"policy": "content_policy_violation", "quota": "insufficient_quota"}
@@ -68,7 +67,7 @@ def _part(part: dict[str, Any]) -> str | tuple[str, str]:
     if part["type"] == "text":
         return part["text"]
     head, _, data = part["image_url"]["url"].partition(";base64,")
-    return head.removeprefix("data:"), hashlib.sha256(base64.b64decode(data)).hexdigest()
+    return picture_part(head.removeprefix("data:"), data)
 
 
 _HISTORY = re.compile(r"^\d+\. (?P<operation>.+?)(?:: .*)?$", re.MULTILINE)

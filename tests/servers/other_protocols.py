@@ -1,12 +1,10 @@
 """Servers that speak the Anthropic Messages protocol, and the Gemini generateContent protocol."""
 
-import base64
-import hashlib
 from typing import Any
 
 from aiohttp import web
 
-from tests.servers.chassis import LocalServer, Seen
+from tests.servers.chassis import LocalServer, Seen, picture_part
 
 
 class AnthropicMessages(LocalServer):
@@ -57,7 +55,7 @@ def _block(part: dict[str, Any]) -> str | tuple[str, str]:
     if part["type"] == "text":
         return part["text"]
     source = part["source"]
-    return source["media_type"], hashlib.sha256(base64.b64decode(source["data"])).hexdigest()
+    return picture_part(source["media_type"], source["data"])
 
 
 class GeminiGenerate(LocalServer):
@@ -97,5 +95,4 @@ def _part(part: dict[str, Any]) -> str | tuple[str, str]:
     if "text" in part:
         return part["text"]
     data = part.get("inline_data") or part["inlineData"]
-    mime = data.get("mime_type") or data["mimeType"]
-    return mime, hashlib.sha256(base64.b64decode(data["data"])).hexdigest()
+    return picture_part(data.get("mime_type") or data["mimeType"], data["data"])
