@@ -21,16 +21,11 @@ def test_numbers_are_what_they_were(name, tmp_path, pictures_dir):
     if name == "paper-table1" and official_root() is None:
         pytest.skip(OFFICIAL_MISSING)
     now = golden.run_numbers(name, tmp_path, pictures_dir)
-    assert golden.compare(GOLDEN[name], now, name) == []
+    # What a run has beyond its golden one is no difference.
+    moved = {file: rows.items() - now[file].items() for file, rows in GOLDEN[name].items()}
+    assert not any(moved.values()), moved
 
 
 @pytest.mark.parametrize("name", golden.SUITES)
 def test_requests_are_what_they_were(name, tmp_path, pictures_dir):
-    now = golden.request_digests(name, tmp_path, pictures_dir)
-    assert golden.compare(GOLDEN["requests"][name], now, name) == []
-
-
-def test_a_difference_is_named():
-    moved = {"estimates.csv": {"random": "1", "oracle": "2"}}
-    found = golden.compare({"estimates.csv": {"random": "1", "oracle": "3", "x": "4"}}, moved, "r")
-    assert found == ["r: estimates.csv: oracle: differs", "r: estimates.csv: x: is missing"]
+    assert golden.request_digests(name, tmp_path, pictures_dir) == GOLDEN["requests"][name]

@@ -264,7 +264,7 @@ class Workspace:
     def scored(self, name: str = "scored") -> Path:
         """Copy the run, score the copy again, and return it."""
         copy = shutil.copytree(self.out, self.root / name)
-        self.does("score", copy)
+        self.does("score", copy, "--jobs", "1")
         return copy
 
     def start(self, *args: str | Path) -> Forked:

@@ -9,17 +9,14 @@ from phyblock.config.models import load_models
 from phyblock.config.suite import load_suite
 from phyblock.models.costs import text_tokens
 from phyblock.run.plan import estimate, make_plan
-from phyblock.run.runner import Session
 from tests.models.factory import ROUTES
 from tests.servers.billing import COMPLETION, PROVIDERS, BillingOpenAI, o200k_tokens, tile_tokens
 from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat, said
 from tests.workspace import (
     CALL_USD,
-    KEY_VARIABLE,
     PRICE,
     TWICE,
-    in_a_loop,
     questions,
     write_questions,
 )
@@ -99,12 +96,10 @@ def begin(workspace, stack):
         entries[name] = {
             "id": model_id,
             "api_base": running.url + ROUTES.get(provider, ROUTES["openai"]).path,
-            "api_key_env": KEY_VARIABLE,
             "temperature": None,
             "price": TARIFF,
         }
     workspace.write_yaml("models.yaml", entries)
-    workspace.write_scenes()
     write_questions(workspace.root / "questions", questions())
     workspace.write_suite(
         tracks=["full_planning", "vqa"],
@@ -116,13 +111,6 @@ def begin(workspace, stack):
     return servers
 
 
-@in_a_loop
-async def asked(workspace, plan):
-    """Ask everything of a plan; no tables are made."""
-    result = await Session(plan, workspace.out, lambda _: None, use_cache=False).run()
-    assert (result.left, result.failed) == (0, 0), result
-
-
 def dollars(prompt_tokens, replies):
     return (prompt_tokens * TARIFF["input"] + replies * COMPLETION * TARIFF["output"]) / 1e6
 
@@ -132,7 +120,7 @@ def test_a_dry_run_is_near_the_bill_of_every_provider(workspace):
         servers = begin(workspace, stack)
         plan = planned(workspace)
         rows = estimate(plan, workspace.out, use_cache=False)
-        asked(workspace, plan)
+        workspace.completed("--yes", "--no-cache")
         left = estimate(plan, workspace.out, use_cache=False)
     records = workspace.records()
     for row in rows:
@@ -169,13 +157,11 @@ def test_episodes_are_billed_no_more_than_a_dry_run_expects(workspace):
     server = BillingOpenAI(o200k_tokens, tile_tokens, 3, say=said)
     with Running(server) as running:
         entry = {"id": "openai/gpt-4o-2024-08-06", "api_base": f"{running.url}/v1", "price": TARIFF}
-        entry["api_key_env"] = KEY_VARIABLE
         workspace.write_yaml("models.yaml", {"m": entry})
-        workspace.write_scenes()
         workspace.write_suite(tracks=["step_planning"], models=["m"], limit=2)
         plan = planned(workspace)
         (row,) = estimate(plan, workspace.out, use_cache=False)
-        asked(workspace, plan)
+        workspace.completed("--yes", "--no-cache")
     assert len(server.billed) <= row.calls
     assert sum(server.billed) <= row.prompt_tokens * (1 + WITHIN)
     a_call, expected = sum(server.billed) / len(server.billed), row.prompt_tokens / row.calls

@@ -45,7 +45,7 @@ def scores(records):
 def test_tables_follow_from_the_records_byte_for_byte(copy):
     path, tables = copy.out / "records.jsonl", copy.tables()
     kept = path.read_bytes(), (copy.out / "run.yaml").read_bytes()
-    copy.does("score", "out", fresh=True)
+    copy.does("score", "out", "--jobs", "1", fresh=True)
     assert (path.read_bytes(), (copy.out / "run.yaml").read_bytes()) == kept
     assert copy.tables() == tables
     lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
@@ -237,5 +237,5 @@ def test_scores_can_be_made_where_the_data_set_has_moved(copy):
     manifest = copy.out / "run.yaml"
     lost = manifest.read_text(encoding="utf-8").replace("root: ", "root: /nowhere")
     manifest.write_text(lost, encoding="utf-8")
-    assert copy.phyblock("score", "out").code == 2
-    copy.does("score", "out", "--data", "moved")
+    assert copy.phyblock("score", "out", "--jobs", "1").code == 2
+    copy.does("score", "out", "--jobs", "1", "--data", "moved")

@@ -40,6 +40,11 @@ def run(out, *args):
     return call("run", "suite.yaml", "--out", out, "--no-report", "--yes", "--no-cache", *args)
 
 
+def score(folder, *args):
+    """Score again in this process: others take seconds to start."""
+    return call("score", folder, "--jobs", "1", *args)
+
+
 def read_earlier(monkeypatch):
     """Read as readers of an earlier version, which did not read all numbers."""
     monkeypatch.setattr(manifest, "READER_VERSION", EARLIER)
@@ -100,7 +105,7 @@ def test_it_is_refused_until_it_is_scored_and_then_ends_as_if_today_had_begun_it
     assert workspace.files() == files
     asked = len(begun.seen)
     capsys.readouterr()
-    assert call("score", "out") == 0
+    assert score("out") == 0
     assert len(begun.seen) == asked
     scored = newest(workspace, "out")
     diverged = {name for name, one in scored.items() if one["error"] and not before[name]["error"]}
@@ -127,7 +132,7 @@ def test_a_kill_before_either_file_is_replaced_processes_and_shards_end_in_the_s
 
     for name in ("whole", "1", "2", "processes", "shards"):
         shutil.copytree(workspace.out, workspace.root / name)
-    assert call("score", "whole") == 0
+    assert score("whole") == 0
     for writes in (1, 2):
         folder = workspace.root / str(writes)
         left, write = writes, store.atomic_write
@@ -146,22 +151,22 @@ def test_a_kill_before_either_file_is_replaced_processes_and_shards_end_in_the_s
         assert (records(folder.name) == records("out")) == (writes == 1)
         with pytest.raises(StoreError, match="by another version"):
             run(folder.name)
-        assert call("score", folder.name) == 0
+        assert score(folder.name) == 0
         assert newest(workspace, folder.name) == newest(workspace, "whole")
     assert run("2") == 0
     assert call("score", "processes", "--jobs", "2") == 0
     for shard in ("2/3", "1/3", "3/3"):
-        assert call("score", "shards", "--shard", shard) == 0
+        assert score("shards", "--shard", shard) == 0
     assert records("processes") == records("shards") == records("whole")
 
 
 @pytest.mark.usefixtures("begun")
 def test_answers_of_a_shard_about_earlier_records_are_refused(workspace):
-    assert call("score", "out", "--shard", "1/1") == 0
+    assert score("out", "--shard", "1/1") == 0
     assert run("out") == 0
     before = newest(workspace, "out")
     with pytest.raises(StoreError, match="is not the record that was scored"):
-        call("score", "out", "--shard", "1/1")
+        score("out", "--shard", "1/1")
     assert newest(workspace, "out") == before
-    assert call("score", "out") == 0
+    assert score("out") == 0
     assert newest(workspace, "out") == before

@@ -84,7 +84,7 @@ def test_all_tracks_ask_and_read_by_the_schema(inside):
     # Under the other format it is another run; judged again it is the same.
     with pytest.raises(InputError, match="another run"):
         call("run", "suite.yaml", "--out", "out", "--limit", 2, "--set", "answer_format=text")
-    assert call("score", "out") == 0
+    assert call("score", "out", "--jobs", "1") == 0
     assert inside.records() == records
 
     # A recording is read in the form in which it was asked for.
