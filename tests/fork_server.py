@@ -46,22 +46,11 @@ _CHANGING = {
 
 @dataclass(frozen=True)
 class Done:
-    """The end of a command."""
+    """The end of a command: code None where it hung, negative where a signal ended the process."""
 
-    code: int
+    code: int | None
     out: str
     err: str
-
-    @property
-    def errors(self) -> list[str]:
-        """The messages on stderr, one a problem."""
-        found: list[str] = []
-        for line in self.err.splitlines():
-            if line.startswith("error: "):
-                found.append(line)
-            elif found:
-                found[-1] += "\n" + line
-        return found
 
 
 def killed(marks: Path, times: int) -> str:

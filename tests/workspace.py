@@ -91,6 +91,17 @@ def csv_rows(path: Path, **options: Any) -> list[dict[str, str]]:
         return list(csv.DictReader(file, **options))
 
 
+def files_below(folder: Path) -> dict[str, bytes]:
+    """Every file and link by relative path; a link is told by where it leads."""
+    return {
+        str(path.relative_to(folder)): b"-> " + bytes(path.readlink())
+        if path.is_symlink()
+        else path.read_bytes()
+        for path in folder.rglob("*")
+        if path.is_symlink() or path.is_file()
+    }
+
+
 def candidates() -> list[Raw]:
     """Sixteen candidates that all differ; the first five are the cubes."""
     looks = [("cube", color, 0) for color in _COLORS]
@@ -185,14 +196,8 @@ class Workspace:
 
     def write_models(self, url: str, *names: str, **fields: Any) -> Path:
         """`models.yaml`: each name is a model of the local server at `url`."""
-        return self.write_served(dict.fromkeys(names, url), **fields)
-
-    def write_served(self, urls: Mapping[str, str], **fields: Any) -> Path:
-        """`models.yaml`: each is a model of a local server."""
-        entries = {
-            name: {"id": f"hosted_vllm/{name}", "api_base": f"{url}/v1", **fields}
-            for name, url in urls.items()
-        }
+        entry = {"api_base": f"{url}/v1", **fields}
+        entries = {name: {"id": f"hosted_vllm/{name}", **entry} for name in names}
         return self.write_yaml("models.yaml", entries)
 
     def write_yaml(self, name: str, content: object) -> Path:
@@ -290,11 +295,8 @@ class Workspace:
 
     def files(self) -> dict[str, bytes]:
         """Every file below the folder but pictures, by relative path."""
-        return {
-            str(path.relative_to(self.root)): path.read_bytes()
-            for path in sorted(self.root.rglob("*"))
-            if path.is_file() and "pictures" not in path.parts
-        }
+        found = files_below(self.root).items()
+        return {name: data for name, data in found if "pictures" not in name.split("/")}
 
 
 VIEW = [45, 22]

@@ -179,7 +179,7 @@ INPUTS = (
              "straight: {id: My/x, api_base: 'http://127.0.0.1:9/v1', transport: direct}\n",
              "validate", "models.yaml"),
         ("models.yaml:1:15: far.replay: recordings not found",
-         "models.yaml:2:6: odd: has an unknown provider", "did you mean openai?"), messages=2),
+         "has an unknown provider", "did you mean openai?"), messages=2),
     # A file that is there and cannot be read, for root too.
     Bad("validate-locked", command("validate", "/proc/self/mem"), ("mem: cannot be read: ",)),
     Bad("validate-data", pipe("data/scenes.jsonl", "validate", "data"), ("is not a regular file",)),

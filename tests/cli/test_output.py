@@ -18,7 +18,7 @@ from phyblock.web.report import write_report
 from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.web.factory import LEVELS, manifest, record, score, write_run
-from tests.workspace import COMMAND, invoked
+from tests.workspace import COMMAND, files_below, invoked
 
 Prepare = Callable[[Path], None]
 
@@ -135,16 +135,6 @@ def test_the_folder_of_a_run_is_found_again_without_naming_it(suite):
     assert suite.files() == before
 
 
-def files(folder):
-    return {
-        str(path.relative_to(folder)): b"-> " + bytes(path.readlink())
-        if path.is_symlink()
-        else path.read_bytes()
-        for path in folder.rglob("*")
-        if path.is_symlink() or path.is_file()
-    }
-
-
 def put(path, text="mine"):
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text)
@@ -197,10 +187,10 @@ IN_THE_WAY = {
 def test_what_is_in_the_way_is_named_and_stays(finished, name):
     prepare, said = IN_THE_WAY[name]
     prepare(finished)
-    before = files(finished.parent).items()
+    before = files_below(finished.parent).items()
     with pytest.raises(StoreError, match=said):
         invoked("report", finished)
-    after = files(finished.parent)
+    after = files_below(finished.parent)
     assert {path: after[path] for path, _ in before if not path.endswith(LIST)}.items() <= before
     assert not (finished / "report").is_dir() or (finished / "report").is_symlink()
 
@@ -246,7 +236,7 @@ def test_a_verb_writes_over_its_own_files_and_no_others(tmp_path, verb):
     with pytest.raises(StoreError, match=f"{re.escape(name)}: .*{said}"):
         invoked(*called, "--out", tmp_path / "theirs")
     assert (tmp_path / "theirs" / name).read_text() == "mine"
-    assert set(files(tmp_path / "theirs")) <= {name, LIST}
+    assert set(files_below(tmp_path / "theirs")) <= {name, LIST}
 
 
 def test_output_that_nobody_takes_is_no_traceback(suite):
@@ -282,7 +272,7 @@ def test_a_run_goes_on_only_where_its_report_can_be_written(suite):
     words = ("run", suite.root / "suite.yaml", "--out", suite.out)
     invoked(*words, "--no-report")
     put(suite.out / "tables" / "mine.md")
-    before = files(suite.root).items()
+    before = files_below(suite.root).items()
     for name in ("report", "linked-report", "page"):
         prepare, said = IN_THE_WAY[name]
         prepare(suite.out)
@@ -290,5 +280,5 @@ def test_a_run_goes_on_only_where_its_report_can_be_written(suite):
             invoked(*words)
         for path in (suite.out / "report", suite.out / "report.html"):
             path.unlink(missing_ok=True)
-    assert before <= files(suite.root).items()
+    assert before <= files_below(suite.root).items()
     invoked(*words, "--no-report")

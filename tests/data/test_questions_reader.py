@@ -11,22 +11,10 @@ from phyblock.domain.question import Mark
 from phyblock.domain.scene import Block
 from phyblock.errors import DataError
 from tests.data.broken import sound_scene, with_value, without, write_scenes
-from tests.fuzz.strategies import QUESTIONS
+from tests.fuzz.strategies import QUESTIONS, sound_question
 from tests.workspace import tower, write_lines
 
-QUESTION = {
-    "id": "co-001",
-    "subtask": "CO",
-    "category": "object_property",
-    "scene_id": "s1",
-    "wording": "co-1",
-    "question": "What is the color of the cube?",
-    "options": ["red", "blue", "green", "yellow"],
-    "answer": "B",
-    "colors": {"1": "blue"},
-    "pictures": [{"label": "scene", "view": [45, 22]}],
-    "evidence": {"slots": {"block": "cube"}},
-}
+QUESTION = sound_question("s1") | {"id": "co-001"}
 
 
 @pytest.fixture
@@ -78,7 +66,7 @@ BROKEN = [
     ("options", ["red", "blue", "Red ", "green"], "options[2]", '"Red "'),
     ("options", ["red", "blue", "green"], "options", '["red", "blue", "green"]'),
     ("options", ["<img1>", "<img2>", "<img3>", "<img4>"], "pictures", ALL),
-    ("options", [f"place {letter}" for letter in "ABCD"], "pictures", ALL),
+    ("options", [f"place {letter}" for letter in "ABCD"], "pictures", '["B", "C", "D"]'),
     ("subtask", "XX", "subtask", '"XX"'),
     ("category", "dynamic_reasoning", "category", '"dynamic_reasoning"'),
     ("question", " ", "question", '" "'),
@@ -133,7 +121,7 @@ OTHERS = {
     "question": "Which color has the cube?",
     "options": ["red", "blue", "yellow", "green"],
     "answer": "C",
-    "colors": {"1": "green"},
+    "colors": {"1": "blue"},
     "pictures": [{"label": "scene", "view": [45, 22], "without": [2]}],
     "evidence": {"slots": {"block": "blue cube"}},
     "wording": "co-2",

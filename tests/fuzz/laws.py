@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 
 from aiohttp import web
 
-from tests.fork_server import run_forked
+from tests.fork_server import Done, run_forked
 from tests.servers.chassis import Seen
 from tests.servers.faults import WIRE_FAULTS
 from tests.servers.openai_chat import OpenAIChat, StepAgent
@@ -49,14 +49,6 @@ class Broken(NamedTuple):
         return f"law {self.law}: {self.kind}"
 
 
-class Ended(NamedTuple):
-    """The end of a command: code None where it hung, negative where a signal ended the process."""
-
-    code: int | None
-    out: str = ""
-    err: str = ""
-
-
 def watched(
     args: Sequence[str],
     folder: Path,
@@ -64,18 +56,17 @@ def watched(
     may_write: Sequence[str],
     lasting: Sequence[str] = (),
     longest_s: float = _LONGEST_S,
-) -> tuple[Ended, list[Broken]]:
+) -> tuple[Done, list[Broken]]:
     """Run a command to its end, or for its longest time; return its end and the laws it broke.
 
     `may_write` are the paths in the folder that the command is to write in, and `lasting` those of
     the user's files that stand there all the same.
     """
     before, lines = _tree(folder), _whole_lines(folder)
-    ended = Ended(None)
+    ended = Done(None, "", "")
     with tempfile.TemporaryFile() as file:
         with contextlib.suppress(subprocess.TimeoutExpired):
-            done = run_forked(args, folder, env, timeout_s=longest_s, deeds=file)
-            ended = Ended(done.code, done.out, done.err)
+            ended = run_forked(args, folder, env, timeout_s=longest_s, deeds=file)
         file.seek(0)
         deeds = [json.loads(line) for line in file]
     found, after = list(_ending_broken(ended)), _tree(folder)
@@ -105,7 +96,7 @@ def _look(path: Path) -> tuple[str, str]:
     return "folder" if path.is_dir() else "other", ""
 
 
-def _ending_broken(ended: Ended) -> Iterator[Broken]:
+def _ending_broken(ended: Done) -> Iterator[Broken]:
     if ended.code is None:
         yield Broken(1, "it hangs", "")
     elif "Traceback (most recent call last)" in ended.out + ended.err:

@@ -2,7 +2,6 @@
 batches under faults and kills; costs under whatever usage is reported.
 """
 
-import asyncio
 import json
 import math
 import random
@@ -186,10 +185,7 @@ def test_batches(kind, route, faults, kills):
         config = ROUTES[route].config(running.url, batch=True, price={"input": 1.0, "output": 1.0})
         disk = Disk(Path(folder))
         for at in kills:
-            killing = Killing(at)
-            disk.moment, server.moment = killing.here, killing.there
-            asyncio.run(killing.run(command(config, disk, requests, policy=policy)))
-        disk.moment, server.moment = None, lambda *_: None
+            Killing(at).run(disk, server, command(config, disk, requests, policy=policy))
         options = {"policy": policy, "budget": Budget(1e9)}
         failed = []
         for _ in range(COMMANDS):

@@ -204,14 +204,20 @@ class Killing:
 
     def __init__(self, at: int) -> None:
         self.at = at
-        self.count = itertools.count()
         self.names: list[str] = []
+        self._count = itertools.count()
         self._loop: asyncio.AbstractEventLoop | None = None
-        self._killed = asyncio.Event()
-        self._over = threading.Event()
+        self._killed, self._over = asyncio.Event(), threading.Event()
 
-    async def run(self, work: Coroutine[Any, Any, Any]) -> bool:
+    def run(self, disk: Disk, server: BatchServer, work: Coroutine[Any, Any, Any]) -> bool:
         """True if the work came to its end."""
+        disk.moment, server.moment = self._here, self._there
+        try:
+            return asyncio.run(self._run(work))
+        finally:
+            disk.moment, server.moment = None, lambda _: None
+
+    async def _run(self, work: Coroutine[Any, Any, Any]) -> bool:
         self._loop = asyncio.get_running_loop()
         task, killed = asyncio.create_task(work), asyncio.create_task(self._killed.wait())
         await asyncio.wait([task, killed], return_when=asyncio.FIRST_COMPLETED)
@@ -225,15 +231,15 @@ class Killing:
 
     def _is_now(self, name: str) -> bool:
         self.names.append(name)
-        return next(self.count) == self.at
+        return next(self._count) == self.at
 
-    async def here(self, name: str) -> None:
+    async def _here(self, name: str) -> None:
         """A moment on the client's side."""
         if self._is_now(name):
             self._killed.set()
             await asyncio.sleep(60)
 
-    def there(self, _: int, name: str) -> None:
+    def _there(self, name: str) -> None:
         """A moment on the server's side, which waits until the client is dead."""
         if self._is_now(name):
             self._loop.call_soon_threadsafe(self._killed.set)

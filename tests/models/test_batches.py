@@ -1,6 +1,5 @@
 """Batches: every question gets what a call of its own would have got, once, whatever happens."""
 
-import asyncio
 import contextlib
 import itertools
 import json
@@ -279,9 +278,7 @@ def test_a_kill_at_any_moment_loses_nothing_and_asks_nothing_twice(route, tmp_pa
         disk = Disk(tmp_path / str(at))
         killing = Killing(at)
         with serving(route) as (server, config):
-            disk.moment, server.moment = killing.here, killing.there
-            is_over = asyncio.run(killing.run(command(config, disk, requests)))
-            disk.moment, server.moment = None, lambda *_: None
+            is_over = killing.run(disk, server, command(config, disk, requests))
             again = run_command(config, disk, requests, budget=Budget(1e9))
             if "is not known whether" in str(again[0]):
                 disk.lines = look_up(server, disk.lines, str(again[0]))

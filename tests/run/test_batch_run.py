@@ -33,7 +33,7 @@ def test_a_run_that_waits_is_stopped_and_goes_on_by_the_same_command(workspace):
         waits = threading.Event()
         looks = iter(range(10**6))
 
-        def moment(_, name):
+        def moment(name):
             # What the first look gave was told before the second.
             if name == "look done" and next(looks) == 1:
                 waits.set()
@@ -91,7 +91,7 @@ def killed_at(workspace, server, number):
     reached, first, pids = threading.Event(), threading.Event(), []
     count = iter(range(10**6))
 
-    def moment(_, __):
+    def moment(_):
         if next(count) == number:
             first.wait(30)
             reached.set()
@@ -103,5 +103,5 @@ def killed_at(workspace, server, number):
         pids.append(process.pid)
         first.set()
         process.communicate()
-    server.moment = lambda *_: None
+    server.moment = lambda _: None
     return reached.is_set()

@@ -40,7 +40,8 @@ def test_a_model_that_cannot_answer_is_stopped_alone(workspace):
     servers = [OpenAIChat(Faults(mode=mode)) for mode in ("401", "404", "ok")]
     with Running(servers[0]) as locked, Running(servers[1]) as unknown, Running(servers[2]) as fine:
         urls = {"locked": locked.url, "unknown": unknown.url, "fine": fine.url}
-        workspace.write_served(urls)
+        served = {n: {"id": f"hosted_vllm/{n}", "api_base": f"{u}/v1"} for n, u in urls.items()}
+        workspace.write_yaml("models.yaml", served)
         workspace.write_suite(models=list(urls), seeds=list(range(20)))
         done = workspace.run("--set", "limits.max_concurrency=6")
         assert (done.code, done.err) == (1, "")
@@ -122,7 +123,7 @@ def test_a_disk_that_takes_neither_replies_nor_records_ends_the_run_after_few_ca
         workspace.out = workspace.root / "full"
         done = workspace.run(bytes_left=20_000)
         assert done.code == 2
-        assert len(done.errors) == 1
+        assert done.err.count("error: ") == 1
         kept = len(workspace.records())
         asked = server.requests
         assert kept < SAMPLES

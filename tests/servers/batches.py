@@ -4,7 +4,6 @@ break off.
 A batch answers each of its requests as the server would answer it alone, and counts it as asked.
 """
 
-import itertools
 import json
 import time
 from collections import Counter
@@ -70,8 +69,7 @@ class BatchServer(LocalServer):
         self.calls: list[str] = []
         self.under_way = 0
         self.keys: set[str] = set()
-        self.moment: Callable[[int, str], None] = lambda *_: None
-        self._moments = itertools.count()
+        self.moment: Callable[[str], None] = lambda _: None
         self._met: Counter[str] = Counter()
 
     def key_of(self, request: web.Request) -> str:
@@ -99,7 +97,7 @@ class BatchServer(LocalServer):
         async def answer(request: web.Request) -> web.StreamResponse:
             self.calls.append(kind)
             self.keys.add(self.key_of(request))
-            self.moment(next(self._moments), f"{kind} arrived")
+            self.moment(f"{kind} arrived")
             faults = self.batch_faults.calls.get(kind, ())
             fault = faults[self._met[kind]] if self._met[kind] < len(faults) else ""
             self._met[kind] += 1
@@ -109,7 +107,7 @@ class BatchServer(LocalServer):
                 error = self.error(int(fault), fault, "went wrong")
                 return web.json_response(error, status=int(fault))
             done = await work(request)
-            self.moment(next(self._moments), f"{kind} done")
+            self.moment(f"{kind} done")
             if fault == "done-reset":
                 return reset_connection(request)
             return done if isinstance(done, web.StreamResponse) else web.json_response(done)
