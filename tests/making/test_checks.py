@@ -7,16 +7,7 @@ import pytest
 
 from phyblock.domain.scene import CandidateSet
 from phyblock.domain.symmetry import Symmetry
-from phyblock.making.checks import (
-    CHECKS,
-    FOREIGN_CHECKS,
-    VERIFIED,
-    SceneFacts,
-    check_set,
-    findings_of,
-    verify_foreign,
-    verify_scene,
-)
+from phyblock.making import checks
 from phyblock.making.files import SCENE_FILES, SUMS_FILE, sums_text
 from phyblock.making.scenes.candidates import make_candidates
 from phyblock.making.scenes.sketch import make_scene, transformed
@@ -74,16 +65,16 @@ SPOILED = {
 
 
 def test_every_check_has_an_example_here_and_is_chosen_somewhere():
-    assert set(SPOILED) == set(CHECKS) == {*VERIFIED, "palette"}
-    assert set(FOREIGN_CHECKS) <= set(VERIFIED)
+    assert set(SPOILED) == set(checks.CHECKS) == {*checks.VERIFIED, "palette"}
+    assert set(checks.FOREIGN_CHECKS) <= set(checks.VERIFIED)
 
 
 @pytest.mark.parametrize("name", SPOILED)
 def test_a_check_finds_its_own_fault_measured_in_units(name):
-    assert list(findings_of(SceneFacts(GATE, OFFERED, trial=SHORT), [name])) == []
+    assert list(checks.findings_of(checks.SceneFacts(GATE, OFFERED, trial=SHORT), [name])) == []
     scene, said = SPOILED[name]
     offered = CandidateSet(OFFERS.get(name, OFFERED.candidates))
-    findings = list(findings_of(SceneFacts(scene, offered, trial=SHORT), [name]))
+    findings = list(checks.findings_of(checks.SceneFacts(scene, offered, trial=SHORT), [name]))
     assert {finding.check for finding in findings} == {name}
     assert any(said in str(finding) for finding in findings)
     orders = {GROUND, *(block.order for block in scene.blocks)}
@@ -100,7 +91,7 @@ def test_duplicates_and_orphans_of_a_set_are_found():
     image = transformed(GATE.blocks, Symmetry(1, mirrored=True))
     copy = replace(GATE, id="copy", blocks=tuple(map(moved, image)), parents=(GATE.id,))
     orphan = replace(TASKS[0].scene, parents=("nowhere",))
-    found = [(one.where, one.check) for one in check_set([GATE, copy, orphan])]
+    found = [(one.where, one.check) for one in checks.check_set([GATE, copy, orphan])]
     assert found == [("copy", "duplicate"), (orphan.id, "parents")]
 
 
@@ -111,14 +102,14 @@ def test_the_built_in_set_holds_what_the_paper_holds():
     assert count == {1: 36, 2: 121, 3: 138, 4: 119}
     assert sum(scene.levels == (1, 2) for scene in scenes) == 14
     assert sum(scene.parents == (scene.id,) for scene in scenes) == 150
-    assert check_set(scenes) == ()
+    assert checks.check_set(scenes) == ()
     assert (BUILT_IN / SUMS_FILE).read_text() == sums_text(BUILT_IN, SCENE_FILES)
     assert all(task.candidates == make_candidates(task.scene) for task in TASKS)
 
 
 @pytest.mark.parametrize("task", TASKS[::100], ids=lambda task: task.scene.id)
 def test_some_of_the_built_in_set_again(task):
-    assert verify_scene((task.scene, task.candidates)) == ()
+    assert checks.verify_scene((task.scene, task.candidates)) == ()
 
 
 OVERLAPPING = {"001", "003", "187", "214", "297", "342"}
@@ -138,11 +129,15 @@ def test_annotation_errors_of_the_official_data_are_reported(official_checkout, 
     tasks = [t for t in official_tasks(official_checkout) if is_whole or t.scene.id in some]
     pairs = [(task.scene, task.candidates) for task in tasks]
     with open_workers(2 if is_whole else 1) as workers:
-        verify = verify_foreign if is_whole else functools.partial(verify_foreign, trial=SHORT)
+        verify = (
+            checks.verify_foreign
+            if is_whole
+            else functools.partial(checks.verify_foreign, trial=SHORT)
+        )
         found = dict(zip((s.id for s, _ in pairs), workers.map(verify, pairs), strict=True))
 
-    def having(*checks):
-        return {name for name, one in found.items() if checks_of(one) & set(checks)}
+    def having(*names):
+        return {name for name, one in found.items() if checks_of(one) & set(names)}
 
     assert having("overlap") == OVERLAPPING & found.keys()
     assert having("floating") == having("unstable") == FLOATING & found.keys()

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from phyblock.data.scenes import read_builtin
-from phyblock.domain.blocks import SHAPES
+from phyblock.domain.blocks import COLORS, SHAPES
 from phyblock.domain.question import LETTERS, Mark, QuestionPicture
 from phyblock.domain.scene import Block, Scene
 from phyblock.domain.symmetry import SYMMETRIES
@@ -56,7 +56,7 @@ def test_a_name_fits_its_block_alone_and_speaks_of_what_it_may(scene, features, 
             assert resolve(name, picture) == resolve(name, picture, loosely=True) == (one.order,)
             assert resolve_one(f"the {name}", picture) == one
             if "color" not in features:
-                assert not {"red", "yellow", "blue", "green", "orange"} & set(name.split())
+                assert not {*COLORS} & set(name.split())
             if "type" not in features:
                 assert not any(word in name for word in SHAPE_WORDS)
 
@@ -260,14 +260,10 @@ def test_a_block_stays_where_the_plank_does_not_tip(place_m, stays):
 # Choices: ranks of the right option, drafts that are kept, letters
 
 
-def drawn(seed, n=10):
-    rng = np.random.default_rng(seed)
-    return rng, rng.normal(size=(n, 4))
-
-
 @given(seed=seeds)
 def test_options_that_are_taken_are_apart_and_one_is_right(seed):
-    rng, measures = drawn(seed)
+    rng = np.random.default_rng(seed)
+    measures = rng.normal(size=(10, 4))
     unlike = rng.random((len(measures),) * 2)
     unlike += unlike.T
     four = four_alike(measures, unlike, 0.7, rng)
@@ -279,13 +275,13 @@ def test_options_that_are_taken_are_apart_and_one_is_right(seed):
 
 def test_no_rank_is_more_often_right_than_another():
     """The right one would always be the largest if it were not matched."""
-    ranks = Counter()
+    ranks, unlike = Counter(), np.ones((14, 14))
     for seed in range(200):
-        rng, measures = drawn(seed, 14)
-        measures[0, 0] += 1
-        four = four_alike(measures[:, :1], np.ones((14, 14)), 0.5, rng)
-        if four:
-            below = ranks_among(measures[:, :1], np.ones((14, 14)), four[0], np.array([four[1:]]))
+        rng = np.random.default_rng(seed)
+        measures = rng.normal(size=(14, 1))
+        measures[0] += 1
+        if four := four_alike(measures, unlike, 0.5, rng):
+            below = ranks_among(measures, unlike, four[0], np.array([four[1:]]))
             ranks[round(float(below[0, 0]))] += 1
     assert min(ranks[rank] for rank in range(4)) > 0.15 * ranks.total()
 

@@ -93,7 +93,6 @@ def test_what_was_changed_is_found(static):
 
 def test_pictures_of_options_are_whole_and_told_apart(pictured):
     for question in pictured:
-        kind = question.wording
         options = [picture for picture in question.pictures if picture.label in LETTERS]
         assert all(map(is_inside, question.pictures))
         if options:
@@ -106,9 +105,9 @@ def test_pictures_of_options_are_whole_and_told_apart(pictured):
                 for one in options
             ]
             assert held == [held[0]] * len(LETTERS)
-        if kind in ("cf-color", "pd-next"):
+        if question.wording in ("cf-color", "pd-next"):
             assert not any(find_gaps(picture.blocks, HANGS_M) for picture in question.pictures)
-        if kind == "cf-count":
+        if question.wording == "cf-count":
             assert sorted(question.options) == sorted(OUTCOME_TEXTS)
         if question.subtask == "OR":
             # Nothing is larger or smaller for being early: one outline, two colors.
@@ -120,11 +119,8 @@ def test_pictures_of_options_are_whole_and_told_apart(pictured):
 def test_pictures_that_were_changed_are_found_out(pictured):
     """A color that no text names; the right picture in the place of every wrong one."""
     colored = next(q for q in pictured if q.wording == "cf-color")
-    places = {
-        tuple((b.order, b.position_m, b.euler_deg) for b in one.blocks) for one in colored.pictures
-    }
-    assert len(places) == 1
-    assert len({tuple(b.color for b in one.blocks) for one in colored.pictures}) == 5
+    gray = {tuple(replace(b, color="red") for b in one.blocks) for one in colored.pictures}
+    assert (len(gray), len({one.blocks for one in colored.pictures})) == (1, 5)
     unnamed = next(color for color in COLORS if color not in colored.evidence["slots"].values())
     shown, first, *rest = colored.pictures
     kept = next(b for b in first.blocks if b.order != colored.evidence["removed"])
@@ -132,12 +128,10 @@ def test_pictures_that_were_changed_are_found_out(pictured):
     spoiled = replace(colored, pictures=(shown, replace(first, blocks=blocks), *rest))
     assert problem_of(spoiled) == "picture A shows other colors than the text names"
     matching = next(q for q in pictured if q.wording == "vp-match")
-    right = matching.pictures[1 + matching.answer[0]]
-    copied = [
-        replace(right, label=picture.label) if picture.label in LETTERS else picture
-        for picture in matching.pictures
-    ]
-    spoiled = replace(matching, pictures=tuple(copied))
+    shown, *options = matching.pictures
+    right = options[matching.answer[0]]
+    copied = (replace(right, label=one.label) for one in options)
+    spoiled = replace(matching, pictures=(shown, *copied))
     assert problem_of(spoiled) == "4 of 4 options are right"
 
 
@@ -275,14 +269,10 @@ def test_a_text_or_a_picture_that_gives_the_answer_away_is_a_finding(asked):
     lacking = []
     for number, first in enumerate(5 * of(asked, "VP")):
         scene, option, *_ = first.pictures
-        less = replace(option, blocks=option.blocks[:-1])
-        shown = [
-            replace(less if i == number % 4 else option, label=letter)
-            for i, letter in enumerate(LETTERS)
-        ]
-        lacking.append(
-            replace(first, id=f"vp-{number}", pictures=(scene, *shown), answer=(number % 4,))
-        )
+        shown = [replace(option, label=letter) for letter in LETTERS]
+        right = number % 4
+        shown[right] = replace(shown[right], blocks=option.blocks[:-1])
+        lacking.append(replace(first, id=f"vp-{number}", pictures=(scene, *shown), answer=(right,)))
     texts, pictures = audit_of(cubes), audit_of(lacking)
     assert texts.probes["text"].accuracy == 1
     assert any("text probe" in finding for finding in texts.findings())

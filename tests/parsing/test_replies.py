@@ -173,7 +173,7 @@ _PIECES = (
     "Next plan: |Move(|Move block |done |move |at (1, 2, 3) |x = 1.5 |a red cube |mm |e|.|,|:|="
 )
 PIECES = (*_PIECES.split("|"), "twice", "x2", "|", "| 1 | 2 ", " " * 50, "7" * 40, "a" * 40)
-SIZE = 100_000
+SIZE = 50_000
 MOST_RATIO = 3.0  # 2 is linear, 4 quadratic.
 SMALL_S = 0.05  # Times below this say nothing.
 
@@ -186,7 +186,7 @@ def seconds(read, text):
 
 
 def check(read, piece):
-    """Fail where 100 KB take much more than twice the time of 50 KB, each time."""
+    """Fail where 50 KB take much more than twice the time of 25 KB, each time."""
     whole = (piece * (SIZE // len(piece) + 1))[:SIZE]
     for _ in range(6):
         took = seconds(read, whole)

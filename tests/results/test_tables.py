@@ -6,13 +6,12 @@ from hypothesis import strategies as st
 
 from phyblock.domain.question import SUBTASKS
 from phyblock.files import LIST
-from phyblock.results.compare import compare
 from phyblock.results.load import track_measures
 from phyblock.results.tables import coverage_frame, make_tables, summary_of, write_tables
 from phyblock.results.text import NO_VALUE, Column, TextTable, number, to_latex, to_markdown
 from phyblock.tracks.base import kind_of
 from phyblock.types import OUTCOMES
-from tests.results.test_estimates import EPISODES, episodes, questions
+from tests.results.test_estimates import episodes, questions
 from tests.web.factory import laws, manifest, record, record_lists, run_of, score, write_run
 
 
@@ -46,7 +45,7 @@ def test_tables_of_plans_show_estimates(records, missing):
 
 
 def test_tables_of_episodes_and_questions_show_estimates():
-    assert shown_numbers(episodes(*EPISODES), "step_planning") > 20
+    assert shown_numbers(episodes(), "step_planning") > 20
     assert shown_numbers(questions({**dict.fromkeys(SUBTASKS, 0), "SH": 3, "OR": 1}), "vqa") > 20
 
 
@@ -108,8 +107,7 @@ def test_the_summary_ranks_models_and_says_who_is_above_the_blind_baseline():
         for name, n in tp.items()
         for scene in ("002", "003")
     ]
-    run = run_of(records, facts)
-    summary = summary_of(run)
+    summary = summary_of(run_of(records, facts))
     (table,) = summary.tables
     assert [row[:3] for row in table.rows] == [
         ("1\N{EN DASH}2", "beta", "100.0"),
@@ -117,10 +115,7 @@ def test_the_summary_ranks_models_and_says_who_is_above_the_blind_baseline():
         ("1\N{EN DASH}2", "alpha", "25.0"),
         ("", "random", "0.0"),
     ]
-    ranks = compare(run).ranks
-    assert ranks[["model", "best", "worst"]].values.tolist() == [["beta", 1, 2], ["alpha", 1, 2]]
-    (sentence,) = summary.blind
-    assert sentence.endswith("of 2 models are shown to be above goal-blind (50.0).")
+    assert ["goal-blind (50.0)" in sentence for sentence in summary.blind] == [True]
 
 
 TABLE = TextTable(

@@ -7,17 +7,8 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from scipy import stats
 
+from phyblock.scoring import statistics
 from phyblock.scoring.plan import f1_of, ratio_of
-from phyblock.scoring.statistics import (
-    POWER,
-    Clusters,
-    detectable,
-    holm,
-    in_range,
-    jackknife,
-    rank_ranges,
-    shift,
-)
 from tests.scoring.cases import World
 
 NAMES = st.lists(st.sampled_from("abcdefg"), min_size=1, max_size=3)
@@ -30,7 +21,11 @@ def rng(seed=0):
 
 
 def alone(n):
-    return Clusters.of([[str(i)] for i in range(n)])
+    return statistics.Clusters.of([[str(i)] for i in range(n)])
+
+
+def ends(found):
+    return float(found.lo), float(found.hi)
 
 
 def mean_of(sums):
@@ -45,10 +40,10 @@ def difference_of(sums):
 def test_the_variance_sums_over_all_pairs_that_have_a_base_scene_in_common(parents, seed):
     # Of a sum, leaving a group out changes it by the group: the formula can be written out.
     x = rng(seed).normal(size=len(parents))
-    clusters = Clusters.of(parents)
+    clusters = statistics.Clusters.of(parents)
     in_common = [[bool(set(a) & set(b)) for b in parents] for a in parents]
     variance = max(float(x @ np.array(in_common) @ x), float(x @ x))
-    found = jackknife(x[:, None], clusters, lambda sums: sums[..., 0])
+    found = statistics.jackknife(x[:, None], clusters, lambda sums: sums[..., 0])
     n = clusters.size
     if n < 2:
         assert np.isnan(found.se)
@@ -58,17 +53,17 @@ def test_the_variance_sums_over_all_pairs_that_have_a_base_scene_in_common(paren
 
 @given(hnp.arrays(float, st.integers(2, 30), elements=st.floats(-1e3, 1e3, width=32)))
 def test_a_mean_of_lone_units_has_students_interval(x):
-    found = jackknife(np.stack([x, np.ones(len(x))], 1), alone(len(x)), mean_of)
+    found = statistics.jackknife(np.stack([x, np.ones(len(x))], 1), alone(len(x)), mean_of)
     se = x.std(ddof=1) / np.sqrt(len(x))
     assert found.se == pytest.approx(se, abs=1e-9)
-    lo, hi = x.mean() + stats.t.ppf([0.025, 0.975], len(x) - 1) * se
-    assert (float(found.lo), float(found.hi)) == pytest.approx((lo, hi), abs=1e-6)
+    wanted = x.mean() + stats.t.ppf([0.025, 0.975], len(x) - 1) * se
+    assert ends(found) == pytest.approx(tuple(wanted), abs=1e-6)
 
 
 @given(hnp.arrays(np.int64, (6, 3), elements=st.integers(0, 9)), st.integers(2, 5))
 def test_counts_a_whole_number_of_times_as_large_change_nothing(counts, times):
     for metric in (ratio_of, f1_of):
-        once, often = (jackknife(counts * k, alone(6), metric) for k in (1, times))
+        once, often = (statistics.jackknife(counts * k, alone(6), metric) for k in (1, times))
         for name in ("value", "se", "lo", "hi", "p"):
             a, b = getattr(once, name), getattr(often, name)
             assert np.allclose(a, b, equal_nan=True)
@@ -76,7 +71,7 @@ def test_counts_a_whole_number_of_times_as_large_change_nothing(counts, times):
 
 @given(hnp.arrays(np.int64, (8, 3), elements=st.integers(0, 9)))
 def test_the_interval_of_a_share_holds_it_and_stays_in_its_range(counts):
-    found = in_range(jackknife(counts, alone(8), f1_of))
+    found = statistics.in_range(statistics.jackknife(counts, alone(8), f1_of))
     if np.isnan(found.se):
         assert np.isnan([found.lo, found.hi, found.p]).all()
     else:
@@ -85,7 +80,7 @@ def test_the_interval_of_a_share_holds_it_and_stays_in_its_range(counts):
 
 @given(st.integers(2, 300), st.booleans())
 def test_none_of_n_and_all_of_n_have_wilsons_interval(n, is_right):
-    found = in_range(jackknife([[int(is_right), 1]] * n, alone(n), ratio_of))
+    found = statistics.in_range(statistics.jackknife([[int(is_right), 1]] * n, alone(n), ratio_of))
     assert found.hi > found.lo
     quantile = stats.t.ppf(0.975, n - 1) ** 2
     assert found.hi - found.lo == pytest.approx(quantile / (n + quantile))
@@ -96,14 +91,15 @@ def test_none_of_n_and_all_of_n_have_wilsons_interval(n, is_right):
 def test_scenes_that_agree_leave_a_share_in_doubt(part, whole, n, k):
     """As much as if each were one sample, also where scenes of several counts have the same."""
     counts = np.array([[part, whole]] * n)
-    found = in_range(jackknife(counts * np.arange(1, n + 1)[:, None] ** k, alone(n), ratio_of))
-    same = in_range(jackknife(counts, alone(n), ratio_of))
+    found = statistics.in_range(
+        statistics.jackknife(counts * np.arange(1, n + 1)[:, None] ** k, alone(n), ratio_of)
+    )
+    same = statistics.in_range(statistics.jackknife(counts, alone(n), ratio_of))
     assert 0 < found.lo < found.value < found.hi < 1
-    assert (float(found.lo), float(found.hi)) == pytest.approx((float(same.lo), float(same.hi)))
+    assert ends(found) == pytest.approx(ends(same))
     p, z = part / whole, stats.t.ppf(0.975, n - 1)
-    bounds = [float(found.lo), float(found.hi)]
-    ends = [(p - end) ** 2 for end in bounds]
-    assert ends == pytest.approx([z**2 * e * (1 - e) / n for e in bounds])
+    for end in ends(found):
+        assert (p - end) ** 2 == pytest.approx(z**2 * end * (1 - end) / n)
 
 
 @given(
@@ -111,39 +107,35 @@ def test_scenes_that_agree_leave_a_share_in_doubt(part, whole, n, k):
     st.sampled_from([180.0, 400.0, np.inf]),
 )
 def test_an_interval_stays_in_the_range_of_its_measure(x, most):
-    student = jackknife(np.stack([x, np.ones(len(x))], 1), alone(len(x)), mean_of)
-    found, without = in_range(student, most), in_range(student, np.nan)
+    student = statistics.jackknife(np.stack([x, np.ones(len(x))], 1), alone(len(x)), mean_of)
+    found, without = statistics.in_range(student, most), statistics.in_range(student, np.nan)
     assert (without.lo, without.hi) == (student.lo, student.hi)
     assert 0 <= found.lo <= found.value <= found.hi <= most
     if found.se > 1e-6 * found.value:
         assert found.lo < found.value < found.hi
     if most < np.inf:
-        share = jackknife(np.stack([x / most, np.ones(len(x))], 1), alone(len(x)), mean_of)
-        as_share = in_range(share)
-        assert (float(found.lo), float(found.hi)) == pytest.approx(
-            tuple(most * float(end) for end in (as_share.lo, as_share.hi))
-        )
+        shares = np.stack([x / most, np.ones(len(x))], 1)
+        as_share = statistics.in_range(statistics.jackknife(shares, alone(len(x)), mean_of))
+        assert ends(found) == pytest.approx(tuple(most * end for end in ends(as_share)))
         return
     # A range without end is the limit of one whose end is far away.
-    far = in_range(student, 1e9)
+    far = statistics.in_range(student, 1e9)
     if found.se > 1e-3 * found.value:
-        assert (float(found.lo), float(found.hi)) == pytest.approx(
-            (float(far.lo), float(far.hi)), rel=1e-3, abs=1e-6
-        )
+        assert ends(found) == pytest.approx(ends(far), rel=1e-3, abs=1e-6)
 
 
 @given(hnp.arrays(np.int64, (8, 3), elements=st.integers(0, 9)))
 def test_nothing_differs_from_itself(counts):
     counts[0] = counts[1] = (1, 0, 0)
     pair = np.stack([counts, counts], axis=1)
-    found = jackknife(pair, alone(8), difference_of)
+    found = statistics.jackknife(pair, alone(8), difference_of)
     assert (found.value, found.se, found.lo, found.hi, found.p) == (0, 0, 0, 0, 1)
 
 
 @given(st.integers(2, 12))
 def test_a_few_scenes_that_agree_leave_as_much_doubt_as_a_sign_test(n):
     counts = np.array([[[5, 0, 0], [0, 5, 5]]] * n)
-    found = jackknife(counts, alone(n), difference_of)
+    found = statistics.jackknife(counts, alone(n), difference_of)
     assert found.value == 1
     assert found.p == pytest.approx(stats.binomtest(n, n).pvalue)
 
@@ -151,10 +143,10 @@ def test_a_few_scenes_that_agree_leave_as_much_doubt_as_a_sign_test(n):
 @given(st.floats(0.001, 10), st.integers(5, 200), st.sampled_from([0.05, 0.01, 0.001]))
 def test_what_is_detectable_is_found_in_four_of_five_cases(se, n, level):
     df = n - 1
-    effect = float(detectable(se, n, level))
+    effect = float(statistics.detectable(se, n, level))
     # The estimate, less the effect, over its standard error, is Student's t.
     found = stats.t.sf(stats.t.isf(level / 2, df) - effect / se, df)
-    assert found == pytest.approx(POWER, abs=1e-6)
+    assert found == pytest.approx(statistics.POWER, abs=1e-6)
 
 
 @given(st.integers(1, 7), st.data())
@@ -162,7 +154,7 @@ def test_ranks_are_what_the_pairs_allow(n, data):
     strength = data.draw(st.permutations(range(n)))
     sure = data.draw(hnp.arrays(bool, (n, n)))
     is_better = [[sure[a, b] and strength[a] > strength[b] for b in range(n)] for a in range(n)]
-    ranks = rank_ranges(is_better)
+    ranks = statistics.rank_ranges(is_better)
     for model in range(n):
         rank = 1 + sum(other > strength[model] for other in strength)
         assert ranks[model, 0] <= rank <= ranks[model, 1]
@@ -171,25 +163,25 @@ def test_ranks_are_what_the_pairs_allow(n, data):
 
 
 def test_where_nothing_was_measured_or_all_in_one_base_scene_there_is_no_interval():
-    alone_in_one = jackknife([[1, 1, 0]] * 4, Clusters.of([["a"]] * 4), f1_of)
+    alone_in_one = statistics.jackknife([[1, 1, 0]] * 4, statistics.Clusters.of([["a"]] * 4), f1_of)
     assert (alone_in_one.value, alone_in_one.n_clusters) == (pytest.approx(2 / 3), 1)
-    nothing = jackknife(np.zeros((0, 2, 3)), Clusters.of([]), f1_of)
+    nothing = statistics.jackknife(np.zeros((0, 2, 3)), statistics.Clusters.of([]), f1_of)
     assert nothing.value.shape == (2,)
     assert np.isnan(nothing.value).all()
     for found in (alone_in_one, nothing):
         assert np.isnan([found.se, found.lo, found.hi, found.p]).all()
     with pytest.raises(ValueError, match="needs a base scene"):
-        Clusters.of([["a"], []])
+        statistics.Clusters.of([["a"], []])
 
 
 def test_holm_by_hand():
-    assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
-    assert holm([0.6, np.nan, 0.7]) == pytest.approx([1, np.nan, 1], nan_ok=True)
+    assert statistics.holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
+    assert statistics.holm([0.6, np.nan, 0.7]) == pytest.approx([1, np.nan, 1], nan_ok=True)
 
 
 @given(P_VALUES)
 def test_holm_only_raises_and_keeps_the_order_and_the_least_is_bonferronis(p):
-    corrected = holm(p)
+    corrected = statistics.holm(p)
     assert (corrected >= p).all()
     assert (np.diff(corrected[np.argsort(p, kind="stable")]) >= 0).all()
     assert corrected.min() == pytest.approx(min(1, len(p) * p.min()))
@@ -213,10 +205,10 @@ def test_intervals_hold_the_truth_and_tests_err_as_often_as_they_say(world):
     n, covered, erred = 1000, 0, 0
     for _ in range(n):
         counts, clusters, _ = world.draw(draw, models=2)
-        found = in_range(jackknife(counts[:, 0], clusters, f1_of))
+        found = statistics.in_range(statistics.jackknife(counts[:, 0], clusters, f1_of))
         covered += bool(found.lo <= truth <= found.hi)
         # Both models are alike in truth.
-        erred += bool(jackknife(counts, clusters, difference_of).p < 0.05)
+        erred += bool(statistics.jackknife(counts, clusters, difference_of).p < 0.05)
     assert 0.93 <= covered / n <= 0.97
     assert 0.03 <= erred / n <= 0.07
 
@@ -239,15 +231,17 @@ def close(one, other, scale=1.0):
 def test_what_belongs_to_items_and_blocks_is_no_work_of_levels(seed):
     scores, rng = drawn(seed), np.random.default_rng(seed + 1)
     other = scores + rng.normal(size=(12, 1, 1)) + rng.normal(size=(1, 1, 4))
-    assert close(shift(scores, alone(12)), shift(other, alone(12)))
-    assert close(shift(scores, alone(12)), shift(100 * scores, alone(12)), 100)
+    assert close(statistics.shift(scores, alone(12)), statistics.shift(other, alone(12)))
+    assert close(
+        statistics.shift(scores, alone(12)), statistics.shift(100 * scores, alone(12)), 100
+    )
 
 
 @given(seed=st.integers(0, 10**6))
 def test_an_effect_alike_on_all_items_is_shift(seed):
     scores = drawn(seed)
     moved = scores + np.array([0.0, 5.0, -1.0])[None, :, None]
-    assert shift(moved, alone(12)).sd > shift(scores, alone(12)).sd
+    assert statistics.shift(moved, alone(12)).sd > statistics.shift(scores, alone(12)).sd
 
 
 def test_a_known_shift_lies_in_its_interval():
@@ -258,7 +252,7 @@ def test_a_known_shift_lies_in_its_interval():
         y = y + np.array([-1, 1])[None, :, None] * TRUTH["shift"] / np.sqrt(2)
         y = y + rng.normal(0, TRUTH["interaction"], (ITEMS, LEVELS, 1))
         y = y + rng.normal(0, TRUTH["within"], (ITEMS, LEVELS, BLOCKS))
-        part = shift(y, alone(ITEMS))
+        part = statistics.shift(y, alone(ITEMS))
         hits += part.lo <= TRUTH["shift"] <= part.hi
         square += part.sd**2 / RUNS
     # Three standard errors of a share of 0.95 in so many runs, and of its mean.
@@ -267,5 +261,5 @@ def test_a_known_shift_lies_in_its_interval():
 
 
 def test_nothing_to_tell_has_no_value():
-    assert np.isnan(shift(drawn(1), Clusters.of([("one",)] * 12)).sd)
-    assert shift(np.ones((12, 3, 4)), alone(12)).hi == 0.0
+    assert np.isnan(statistics.shift(drawn(1), statistics.Clusters.of([("one",)] * 12)).sd)
+    assert statistics.shift(np.ones((12, 3, 4)), alone(12)).hi == 0.0

@@ -14,14 +14,6 @@ from hypothesis import strategies as st
 
 from phyblock.domain.blocks import SHAPES
 from phyblock.sim import balance, certificate
-from phyblock.sim.balance import (
-    FRICTIONS,
-    MARGIN_M,
-    is_balanced,
-    prove,
-    surely_falls,
-    surely_stands,
-)
 from phyblock.sim.certificate import ONE, Falls, Stands, proves
 from phyblock.sim.contact import drop_height_m
 from phyblock.sim.dynamics import ONE_SETTING, groups, stands
@@ -42,10 +34,10 @@ def test_a_cube_stands_on_another_as_far_as_its_middle_is_over_it(offset_m, angl
     pair = turned(pair, angle_deg, (0.3, -0.2))
     inside_m = HALF_CUBE_M - abs(offset_m)
     if abs(inside_m) > 1e-4:
-        assert is_balanced(pair) is (inside_m > 0)
-    if abs(abs(inside_m) - MARGIN_M) > 2e-3:
-        assert surely_stands(pair) is (inside_m > MARGIN_M)
-        assert surely_falls(pair) is (inside_m < -MARGIN_M)
+        assert balance.is_balanced(pair) is (inside_m > 0)
+    if abs(abs(inside_m) - balance.MARGIN_M) > 2e-3:
+        assert balance.surely_stands(pair) is (inside_m > balance.MARGIN_M)
+        assert balance.surely_falls(pair) is (inside_m < -balance.MARGIN_M)
 
 
 def loaded(plank, plank_m, weight_m, beside_m=None):
@@ -77,18 +69,20 @@ loaded_planks = st.builds(
 @example(loaded("cuboid2", -0.0375, -0.05))
 def test_least_squares_and_linear_programming_agree(blocks):
     def verdicts():
-        return is_balanced(blocks), surely_stands(blocks)
+        return balance.is_balanced(blocks), balance.surely_stands(blocks)
 
     def finds_none(forces, weights):
         return np.zeros((forces.shape[1], weights.shape[1])), np.zeros(weights.shape[1], dtype=bool)
 
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(balance, "_least_squares", finds_none)
+        patched.setattr("phyblock.sim.balance._least_squares", finds_none)
         by_programming = verdicts()
     assert verdicts() == by_programming
 
 
-@given(loaded_planks, st.floats(0, MARGIN_M), angles_deg.map(lambda a: 4 * a), st.floats(0, 1))
+@given(
+    loaded_planks, st.floats(0, balance.MARGIN_M), angles_deg.map(lambda a: 4 * a), st.floats(0, 1)
+)
 def test_a_sure_verdict_holds_for_all_shifts_and_masses_between(blocks, radius_m, angle_deg, share):
     angle, (light, heavy) = math.radians(angle_deg), balance.MASS_FACTORS
     shift_m = (radius_m * math.cos(angle), radius_m * math.sin(angle))
@@ -96,10 +90,10 @@ def test_a_sure_verdict_holds_for_all_shifts_and_masses_between(blocks, radius_m
     weights, met = balance._weights(blocks, shift_m, factor)[:, None], balance._contacts(blocks)
     borne = [
         balance._pushes(balance._matrix(met, len(blocks), friction), weights) is not None
-        for friction in FRICTIONS
+        for friction in balance.FRICTIONS
     ]
-    assert borne[0] or not surely_stands(blocks)
-    assert not (borne[1] and surely_falls(blocks))
+    assert borne[0] or not balance.surely_stands(blocks)
+    assert not (borne[1] and balance.surely_falls(blocks))
 
 
 @pytest.mark.parametrize(("off_m", "falls"), [(0.002, False), (0.0035, False), (0.007, True)])
@@ -107,7 +101,7 @@ def test_a_balance_nearer_than_the_margin_is_no_sure_fall(off_m, falls):
     """On a ridge a slab balances at one place alone, which is on no ring round another."""
     ridge_m = 0.05 / 2**0.5
     ridge = [block(1, "triangle", (0, 0, 0)), block(2, "cuboid1", (off_m, off_m, ridge_m + 0.0125))]
-    assert surely_falls(ridge) is falls
+    assert balance.surely_falls(ridge) is falls
 
 
 @given(st.floats(-0.01, 0.02), angles_deg)
@@ -116,9 +110,9 @@ def test_a_plank_surely_stands_on_posts_that_it_covers_by_the_margin(over_m, ang
     post_m = max(SHAPES["cuboid3"].high_m) + HALF_CUBE_M - over_m
     posts = [block(i, "cube", (0, y, 0.025)) for i, y in ((1, -post_m), (2, post_m))]
     bridge = [*posts, block(3, "cuboid3", (0, 0, 0.0625), (0, 0, 90))]
-    if abs(over_m - MARGIN_M) > 1e-4:
+    if abs(over_m - balance.MARGIN_M) > 1e-4:
         bridge = turned(bridge, angle_deg, (0.1, 0.2))
-        assert surely_stands(bridge) is (over_m > MARGIN_M)
+        assert balance.surely_stands(bridge) is (over_m > balance.MARGIN_M)
 
 
 @st.composite
@@ -152,11 +146,11 @@ def stands_in(engine, blocks):
 @example([one for one in SCENES["l2-032-slide"] if one.order != 1])
 def test_no_engine_contradicts_a_proof(blocks):
     for group in groups(blocks):
-        proven = prove(group)
-        assert proven is None or proven.stands or not is_balanced(group)
+        proven = balance.prove(group)
+        assert proven is None or proven.stands or not balance.is_balanced(group)
         for engine in installed_engines() if proven else ():
             assert stands_in(engine, group) is proven.stands
-        if surely_stands(group):
+        if balance.surely_stands(group):
             assert all(stands_in(engine, group) for engine in installed_engines())
 
 
@@ -164,12 +158,12 @@ def test_no_engine_contradicts_a_proof(blocks):
 def test_a_wedge_on_two_ridges_surely_stands_where_it_covers_them(name, stands):
     """Its base ends over the ridges, and both engines drop it, or reaches 1 cm beyond them."""
     left = [one for one in SCENES[name] if one.order != 1]
-    assert is_balanced(left)
-    assert surely_stands(left) is stands
+    assert balance.is_balanced(left)
+    assert balance.surely_stands(left) is stands
 
 
-STANDING = prove([*tower(1), block(2, "cuboid3", (0, 0, 0.0625), (0, 0, 90))])
-FALLING = prove([*tower(1), block(2, "cuboid2", (0.06, 0, 0.0625))])
+STANDING = balance.prove([*tower(1), block(2, "cuboid3", (0, 0, 0.0625), (0, 0, 90))])
+FALLING = balance.prove([*tower(1), block(2, "cuboid2", (0.06, 0, 0.0625))])
 
 
 def put(value, path, change):

@@ -18,7 +18,7 @@ from phyblock.sim.dynamics import DEFAULT_TRIAL, ONE_SETTING, check, check_steps
 from phyblock.sim.engine import Pose, open_world
 from phyblock.sim.outcomes import after_removal, holds
 from tests.shipped import TASKS
-from tests.sim.structures import block, built, tower
+from tests.sim.structures import block, built, counterweighted_beam, tower
 
 FIRST = replace(DEFAULT_TRIAL, physics=DEFAULT_TRIAL.physics[:1])
 LINE_BALANCED = {"bowl", "bowl-turned"}
@@ -79,10 +79,9 @@ def test_execution_depends_on_no_process_and_no_processor_and_loads_engines_late
 
 
 def test_what_falls_midway_or_slowly_is_named_at_its_step():
-    sketch = built("cube; cuboid3:flat-y; 2 cube 2.8")
-    steps = [(), (), (2, 3), ()]
-    assert [step.fallen for step in check_steps(sketch.blocks, FIRST)] == steps
-    assert [check(sketch.blocks[:n], FIRST).fallen for n in range(1, 5)] == steps
+    beam, steps = counterweighted_beam(), [(), (), (2, 3), ()]
+    assert [step.fallen for step in check_steps(beam, FIRST)] == steps
+    assert [check(beam[:n], FIRST).fallen for n in range(1, 5)] == steps
     # The load reaches 0.1 mm past the balance point: the slowest fall that a grid can hold.
     slow = built("cube; cuboid3:flat-y 1.004")
     assert not check(slow.blocks, FIRST).stable

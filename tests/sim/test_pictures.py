@@ -3,7 +3,6 @@
 import hashlib
 import io
 import itertools
-import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -37,7 +36,7 @@ from phyblock.sim.question_pictures import (
 )
 from phyblock.sim.ruled import kit_key, ruled_key
 from phyblock.types import BACKGROUNDS
-from tests.shipped import TASKS, built_in_questions
+from tests.shipped import TASKS
 from tests.sim.structures import block, clouds, scene_of, tower
 
 TASK = TASKS[0]
@@ -108,17 +107,13 @@ def lies_between_planes(blocks, camera):
 
 
 @pytest.mark.parametrize("every", [16, pytest.param(1, marks=pytest.mark.slow)])
-def test_no_built_in_picture_is_cut_open_and_blocks_of_wide_goals_are_large(every):
+def test_blocks_of_wide_goals_are_large(every):
     for task in TASKS[::every]:
         style = pictures.goal_style(task.scene, STYLE)
         camera = pictures.goal_camera(task.scene, style)
-        assert lies_between_planes(task.scene.blocks, camera)
         places = np.array([one.position_m for one in task.scene.blocks])
         farthest_m = ((places - camera.eye_m) @ camera.axes[2]).max()
         assert 0.05 / camera.width_m(farthest_m) * style.size_px >= 0.08 * STYLE.size_px
-    for task in built_in_questions().tasks[::every]:
-        for recipe in task.question.pictures:
-            assert lies_between_planes(drawn_blocks(recipe), question_camera(recipe, STYLE)), recipe
 
 
 @given(st.lists(st.sampled_from(EVERY_LOOK), min_size=1, max_size=16), st.floats(1, 89))
@@ -216,18 +211,6 @@ def test_keys_differ_exactly_where_pixels_may():
     assert question_key(PLAIN, replace(STYLE, azimuth_deg=200.0)) == plain
     high, low = (QuestionPicture("block", (one,), VIEW) for one in (TOWER[1], TOWER[0]))
     assert question_key(high, STYLE) == question_key(low, STYLE)
-
-
-def test_a_style_is_checked_and_can_be_sent_to_a_process():
-    assert pickle.loads(pickle.dumps(SMALL)) == SMALL
-    bad = [{"size_px": 10}, {"background": "lava"}, {"elevation_deg": -5.0}]
-    for wrong in [*bad, {"azimuth_deg": float("nan")}]:
-        with pytest.raises(ValueError, match=next(iter(wrong))):
-            pictures.PictureStyle(**wrong)
-    with pytest.raises(ValueError, match="oblique"):
-        pictures.PictureStyle.from_view("below")
-    with pytest.raises(DataError, match="empty"):
-        pictures.goal_png(scene_of([], "empty"), SMALL)
 
 
 @given(angles, st.floats(-85, 85), angles)

@@ -7,9 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import yaml
 
-from phyblock.config.suite import Suite, load_suite
+from phyblock.config.suite import load_suite
 from phyblock.data.base import Dataset
 from phyblock.data.scenes import StoredScene
 from phyblock.domain.scene import AssemblyTask, Block, Candidate, CandidateSet, Scene
@@ -19,16 +18,6 @@ from tests.shipped import TASKS
 from tests.workspace import Raw
 
 
-def suite_of(**fields: Any) -> Suite:
-    """A suite of these fields; pictures are as small as can be."""
-    images = {"size_px": 128, **fields.pop("images", {})}
-    whole = {"name": "s", "models": ["oracle"], "images": images, **fields}
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "suite.yaml"
-        path.write_text(yaml.safe_dump(whole), encoding="utf-8")
-        return load_suite(path)
-
-
 def track_of(
     name: str,
     tasks: Sequence[AssemblyTask] = TASKS,
@@ -36,10 +25,16 @@ def track_of(
     limit: int | None = None,
     **fields: Any,
 ) -> Any:
-    """A track about these scenes; with prompts and pictures where there is a shop to draw them."""
-    suite = suite_of(tracks=[name], **fields)
-    dataset = Dataset("test", Path("."), tuple(tasks))
-    (track,) = open_tracks(suite, dataset, limit, shop)
+    """A track about these scenes, in a suite of these fields; with prompts and small pictures where
+    there is a shop to draw them.
+    """
+    images = {"size_px": 128, **fields.pop("images", {})}
+    whole = {"name": "s", "tracks": [name], "models": ["oracle"], "images": images, **fields}
+    with tempfile.NamedTemporaryFile("w", suffix=".yaml") as file:
+        json.dump(whole, file)
+        file.flush()
+        suite = load_suite(Path(file.name))
+    (track,) = open_tracks(suite, Dataset("test", Path("."), tuple(tasks)), limit, shop)
     return track
 
 

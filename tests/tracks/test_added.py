@@ -2,7 +2,6 @@
 
 import math
 import re
-import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import ClassVar
@@ -15,13 +14,12 @@ from phyblock.errors import SpecError
 from phyblock.results.compare import comparable, compare
 from phyblock.results.estimates import Headline
 from phyblock.results.load import load_run, track_measures
-from phyblock.run.rescore import rescore
 from phyblock.scoring.plan import mean_of, ratio_of
 from phyblock.tracks.base import Judgement, SceneTrack
 from phyblock.tracks.full_planning import FullPlanning
 from phyblock.tracks.measures import LayoutColumn, Measure, SampleCounts, TrackReport
 from phyblock.web.board import SiteRun, Sources, board_of, entries_of, values_of
-from tests.workspace import call, write_questions
+from tests.workspace import call
 
 
 @pytest.fixture
@@ -118,35 +116,6 @@ def test_what_a_track_has_not_is_refused():
         call("run", "suite.yaml", "--set", "answer_format=json_schema", "--out", "json")
     with pytest.raises(SpecError, match="is a person, who cannot answer in counting"):
         call("play", "suite.yaml", "--name", "ada")
-
-
-@pytest.mark.parametrize(
-    ("track", "more", "counts"),
-    [
-        ("step_planning", {"steps": {"physics": "off"}, "levels": [3]},
-         lambda _, record: (record.outcomes[:1] == ("placed",), 1)),
-        ("vqa", {"vqa": {"path": "./questions", "subtasks": ["SH"], "circular": True}},
-         lambda _, record: (record.answer.correct, 1)),
-    ],
-)  # fmt: skip
-def test_scoring_again_counts_in_every_track(here, add, track, more, counts):
-    write_questions(here.root / "questions")
-    here.write_suite(tracks=[track], models=["oracle", "random"], **more)
-    folders = [here.root / name for name in ("out", "same", "new", "scored")]
-    old, same, new, scored = folders
-    assert not call("run", "suite.yaml", "--out", old, "--no-report")
-    for copy in (same, scored):
-        shutil.copytree(old, copy)
-    rescore(same)
-    counted = SampleCounts("sampled", ("part", "whole"), sample=counts)
-    add(track, Measure("part", "Part", counted, ratio_of, "a part"))
-    assert not call("run", "suite.yaml", "--out", new, "--no-report")
-    rescore(scored)
-    before, unchanged, fresh, again = map(here.records, folders)
-    assert unchanged == before
-    counts_now = {line["sample"]: line["counts"] for line in fresh}
-    assert again == [{**line, "counts": counts_now[line["sample"]]} for line in before]
-    assert len({tuple(now["sampled"]) for now in counts_now.values()}) == 2
 
 
 @pytest.mark.parametrize(

@@ -90,15 +90,11 @@ def test_questions_keep_their_background_unless_a_suite_gives_one(question_set):
     asked = next(task.question for task in question_set.tasks if task.key == "vp-000")
     lawn = replace(asked, pictures=tuple(replace(p, background="lawn") for p in asked.pictures))
     bare = [replace(picture, background=None) for picture in asked.pictures]
-    for question, ground, drawn in (
-        (asked, None, "checkerboard"),
-        (lawn, None, "lawn"),
-        (lawn, "white", "white"),
-        (asked, "white", "white"),
-    ):
-        style = replace(STYLE, background=drawn)
-        item = AskedQuestion(QuestionTask(question))
-        drawn = question_drawings(item, STYLE, ground)
+    for question, ground, wanted in (
+        (asked, None, "checkerboard"), (lawn, None, "lawn"), (lawn, "white", "white"),
+    ):  # fmt: skip
+        style = replace(STYLE, background=wanted)
+        drawn = question_drawings(AskedQuestion(QuestionTask(question)), STYLE, ground)
         assert [one.key for one in drawn] == [question_key(picture, style) for picture in bare]
 
 

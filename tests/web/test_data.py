@@ -4,7 +4,6 @@ import base64
 import json
 import math
 import re
-import shutil
 import zlib
 from bisect import bisect_right
 
@@ -40,8 +39,8 @@ def unpacked(script):
     return json.loads(zlib.decompress(base64.b64decode(packed)))
 
 
-def entries_in(folder, starts, kind="records"):
-    chunks = [unpacked(folder / f"{kind}-{n}.js") for n in range(len(starts))]
+def entries_in(folder, starts):
+    chunks = [unpacked(folder / f"records-{n}.js") for n in range(len(starts))]
     return [entry for chunk in chunks for entry in chunk]
 
 
@@ -200,11 +199,10 @@ def planned(seed=0, rules=(), left_out=(), **right):
 
 def test_only_whole_models_have_ranks():
     def board(*runs):
-        rows = board_of(runs, entries_of(runs))["rows"]
-        return {row["name"]: row for row in rows}
+        return board_of(runs, entries_of(runs))["rows"]
 
     def ranks_of(*runs):
-        return {name: row["ranks"].get("full_planning") for name, row in board(*runs).items()}
+        return {row["name"]: row["ranks"].get("full_planning") for row in board(*runs)}
 
     # Models without a common sample are not told apart.
     ranks = ranks_of(planned(a=4), planned(b=1), planned(9, c=0))
@@ -214,18 +212,14 @@ def test_only_whole_models_have_ranks():
     assert ranks_of(planned(rules=["rule"], rule=4, a=3)) == {"rule": None, "a": [1, 1]}
     run = planned(left_out=SCENES[1:], cherry=4, a=3, b=1)
     assert ranks_of(run) == {"cherry": None, "a": [1, 1], "b": [2, 2]}
-    lacking = board(run)["cherry"]["lacking"]["full_planning"]
-    assert lacking == f"1 of {len(SCENES)} answered"
+    lacking = [row["lacking"].get("full_planning", "") for row in board(run)]
+    assert f"1 of {len(SCENES)} answered" in lacking
 
 
 def site_run(where, track="full_planning", suite=None, **more):
     """A run of one track alone, with its identity."""
-    facts = {
-        "dataset": {"name": "d", "sha256": "0" * 64, "version": 2},
-        "tracks": {track: {"prompt": {"name": "p", "version": "a" * 64}}},
-        "created": "2026-11-22T10:00:00+00:00",
-        **more,
-    }
+    tracks = {track: {"prompt": {"name": "p", "version": "a" * 64}}}
+    facts = {"tracks": tracks, "created": "2026-11-22T10:00:00+00:00", **of_data(), **more}
     made = manifest(**facts)
     made["suite"] |= {"tracks": [track], **(suite or {})}
     return SiteRun(where, run_of([], made), Sources())
@@ -249,12 +243,14 @@ def shown(images, digest):
     return {"suite": {"images": images}, "tracks": {"full_planning": identity}}
 
 
-def of_data(name="d", sha256="0", version=2):
-    return {"dataset": {"name": name, "sha256": sha256 * 64, "version": version}}
+def of_data(name="d", sha256="0"):
+    return {"dataset": {"name": name, "sha256": sha256 * 64, "version": 2}}
 
 
-PROMPTED = {"full_planning": {"prompt": {"name": "p", "version": "b" * 64}}}
-CARRIED = {"full_planning": {"carrying": 2}}
+def of_track(**identity):
+    return {"tracks": {"full_planning": identity}}
+
+
 MEMBERSHIP = {"scoring": manifest(level1="membership")["suite"]["scoring"]}
 
 
@@ -264,9 +260,9 @@ MEMBERSHIP = {"scoring": manifest(level1="membership")["suite"]["scoring"]}
         (shown({"background": "lawn"}, "b"), "images.background"),
         (of_data(name="e"), "dataset.name"),
         (of_data(sha256="1"), "dataset.sha256"),
-        ({"tracks": PROMPTED}, "tracks.full_planning.prompt"),
+        (of_track(prompt={"name": "p", "version": "b" * 64}), "tracks.full_planning.prompt"),
         ({"suite": MEMBERSHIP}, "scoring.level1"),
-        ({"tracks": CARRIED}, "tracks.full_planning.carrying"),
+        (of_track(carrying=2), "tracks.full_planning.carrying"),
     ],
 )
 def test_runs_that_differ_in_what_decides_are_refused_with_what_differs(change, field):
@@ -290,8 +286,7 @@ def test_runs_of_different_limits_are_told_so():
 def test_a_recording_and_a_larger_picture_stand_beside_any_other():
     first, larger = site_run("one"), site_run("two", **shown({"size_px": 512}, "b"))
     check_runs([site_run("one", **shown({}, "a")), larger])
-    asked = {"full_planning": {"prompt": None, "pictures": None}}
-    check_runs([first, site_run("two", tracks=asked)])
+    check_runs([first, site_run("two", **of_track(prompt=None, pictures=None))])
 
 
 def test_a_build_that_was_stopped_never_looks_whole_and_what_is_not_ours_stays(
@@ -322,15 +317,3 @@ def test_a_build_that_was_stopped_never_looks_whole_and_what_is_not_ours_stays(
 def test_a_run_given_twice_is_refused(made, tmp_path):
     with pytest.raises(SpecError, match="is the same run as"):
         write_site([made.root / "later", made.root / "later.zip"], tmp_path / "s", data_of(made))
-
-
-def test_two_people_who_ran_one_suite_share_a_leaderboard(made, tmp_path):
-    """Models and seeds are not part of a run's identity, so theirs are equal."""
-    other = tmp_path / "other"
-    shutil.copytree(made.root / "later", other)
-    began = load_run(other).manifest.created
-    text = (other / "run.yaml").read_text(encoding="utf-8")
-    (other / "run.yaml").write_text(text.replace(began, "2026-11-22T10:00:00+00:00"), "utf-8")
-    site = write_site([made.root / "later", other], tmp_path / "s", data_of(made))
-    one = write_site([other], tmp_path / "one", data_of(made))
-    assert (site.models, site.samples) == (2 * one.models, 2 * one.samples)
