@@ -7,7 +7,7 @@ from collections import defaultdict
 import numpy as np
 import pandas as pd
 import pytest
-from hypothesis import example, given
+from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.data.official import match_published
@@ -133,8 +133,10 @@ def questions(right):
     return run_of([asked(n, s, "A" if n < right[s] else "B") for s, n in wanted], facts)
 
 
-@given(st.fixed_dictionaries({}, optional={s: st.integers(0, 4) for s in SUBTASKS}))
-@example(dict.fromkeys(SUBTASKS, 1))
+RIGHT = {subtask: st.integers(0, 4) for subtask in SUBTASKS}
+
+
+@given(st.fixed_dictionaries(RIGHT) | st.fixed_dictionaries({}, optional=RIGHT))
 @laws
 def test_averages_of_questions_are_unweighted_means_of_parts_that_were_all_answered(right):
     run, means = questions(right), []

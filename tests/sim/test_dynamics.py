@@ -10,7 +10,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from phyblock.domain.scene import Block
 from phyblock.making.scenes.sketch import POSES
 from phyblock.sim import dynamics
 from phyblock.sim.contact import drop_height_m
@@ -22,12 +21,7 @@ from tests.sim.structures import block, built, counterweighted_beam, tower
 
 FIRST = replace(DEFAULT_TRIAL, physics=DEFAULT_TRIAL.physics[:1])
 LINE_BALANCED = {"bowl", "bowl-turned"}
-SEESAW = (
-    block(1, "cube", (0, 0, 0.025)),
-    Block(2, "cuboid3", "yellow", (0.055, 0, 0.0625), (0, 0, 0), (1,), 2),
-    block(3, "cube", (0.11, 0, 0.025), color="blue"),
-)
-"""A bar whose middle is far from the cube it lies on: it tips until a second cube is there."""
+BEAM = tuple(counterweighted_beam())
 
 
 @pytest.mark.parametrize(
@@ -79,9 +73,9 @@ def test_execution_depends_on_no_process_and_no_processor_and_loads_engines_late
 
 
 def test_what_falls_midway_or_slowly_is_named_at_its_step():
-    beam, steps = counterweighted_beam(), [(), (), (2, 3), ()]
-    assert [step.fallen for step in check_steps(beam, FIRST)] == steps
-    assert [check(beam[:n], FIRST).fallen for n in range(1, 5)] == steps
+    steps = [(), (), (2, 3), ()]
+    assert [step.fallen for step in check_steps(BEAM, FIRST)] == steps
+    assert [check(BEAM[:n], FIRST).fallen for n in range(1, 5)] == steps
     # The load reaches 0.1 mm past the balance point: the slowest fall that a grid can hold.
     slow = built("cube; cuboid3:flat-y 1.004")
     assert not check(slow.blocks, FIRST).stable
@@ -114,15 +108,15 @@ def test_the_same_falls_whatever_was_tried_before(trial):
         return settle(blocks, trial)
 
     structures = [task.scene.blocks for task in TASKS[::150]]
-    structures += [SEESAW[:2], structures[0][:1], SEESAW, ()]
+    structures += [BEAM[:3], structures[0][:1], BEAM, ()]
     first = [settled(blocks, in_new_worlds=True) for blocks in structures]
     again = [settled(blocks, in_new_worlds=False) for blocks in reversed(structures)][::-1]
     assert first == again == [settle(blocks, trial) for blocks in structures]
-    assert settle(SEESAW, trial).stands
-    tipped = settle(SEESAW[:2])
-    assert tipped.fallen == check(SEESAW[:2]).fallen == (2,)
-    assert tipped.blocks[0] == SEESAW[0]
-    assert tipped.blocks[1].position_m[2] < SEESAW[1].position_m[2] - 0.01
+    assert settle(BEAM, trial).stands
+    tipped = settle(BEAM[:3])
+    assert tipped.fallen == check(BEAM[:3]).fallen == (2, 3)
+    assert tipped.blocks[0] == BEAM[0]
+    assert tipped.blocks[2].position_m[2] < BEAM[2].position_m[2] - 0.01
 
 
 def test_what_rests_on_a_removed_block_moves_and_nothing_else():

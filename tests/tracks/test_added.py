@@ -1,7 +1,6 @@
 """Measures and tracks that are added in one place; names and counts that clash are refused."""
 
 import math
-import re
 from dataclasses import replace
 from pathlib import Path
 from typing import ClassVar
@@ -20,23 +19,6 @@ from phyblock.tracks.full_planning import FullPlanning
 from phyblock.tracks.measures import LayoutColumn, Measure, SampleCounts, TrackReport
 from phyblock.web.board import SiteRun, Sources, board_of, entries_of, values_of
 from tests.workspace import call
-
-
-@pytest.fixture
-def add():
-    """Adds measures to tracks; they are gone after the test."""
-    yield registry.add_measure
-    registry._measures.clear()
-
-
-@pytest.fixture
-def here(inside):
-    inside.write_suite(models=["oracle", "all-candidates"])
-    return inside
-
-
-SAMPLED = SampleCounts("sampled", ("part", "whole"), sample=lambda _, __: (1, 2))
-HALF = Measure("half", "Half", SAMPLED, ratio_of, "one of two")
 
 
 @pytest.mark.parametrize(
@@ -79,18 +61,16 @@ class Counting(SceneTrack):
 
     def judge(self, item, text):
         del item
-        found = re.findall(r"\d+", text or "")
-        number = int(found[-1]) if found else None
-        parse = {"rule": "number" if found else None, "number": number}
-        return Judgement(bool(found), {"parse": parse})
+        number = int(text) if text else None
+        return Judgement(bool(text), {"parse": {"rule": text and "number", "number": number}})
 
 
 @pytest.fixture
-def run(here):
+def run(inside):
     registry.register_track(Counting)
-    here.write_suite(tracks=["counting"], models=["oracle", "random"])
+    inside.write_suite(tracks=["counting"], models=["oracle", "random"])
     assert not call("run", "suite.yaml", "--out", "out", "--no-report")
-    yield load_run(here.out)
+    yield load_run(inside.out)
     registry._registered.pop(Counting.name)
 
 
@@ -119,10 +99,11 @@ def test_what_a_track_has_not_is_refused():
 
 
 @pytest.mark.parametrize(
-    "other", [HALF, replace(HALF, name="other", counted=replace(SAMPLED, columns=("a", "b")))]
+    "other", [EXACT, replace(EXACT, name="other", counted=replace(COUNTS, columns=("a", "b")))]
 )
-def test_two_measures_or_counts_of_one_name_are_refused(add, other):
-    for measure in (HALF, other):
-        add("full_planning", measure)
+def test_two_measures_or_counts_of_one_name_are_refused(other, monkeypatch):
+    monkeypatch.setattr(registry, "_measures", {})
+    for measure in (EXACT, other):
+        registry.add_measure("full_planning", measure)
     with pytest.raises(ValueError, match="are called"):
         track_measures("full_planning")

@@ -36,19 +36,16 @@ from tests.shipped import TASKS
 WORDS = ("cube", "arch", "cylinder", "cuboid", "cone", "prism")
 
 
-def question(number, options, answer, subtask="SH"):
+def question(number, options, answer):
     scene = Scene(f"s{number}", (2,), (), (f"base{number % 40}",))
     text = f"Which one is it, {WORDS[number % 6]} or not?"
-    return Question(f"{subtask.lower()}-{number}", subtask, scene, text, options, answer)
+    return Question(f"sh-{number}", "SH", scene, text, options, answer)
 
 
 def made_by(rule, n=200):
     rng = np.random.default_rng(3)
-    found = []
-    for number in range(n):
-        options, right = rule(rng)
-        found.append(question(number, tuple(options), (right,)))
-    return found
+    rows = [rule(rng) for _ in range(n)]
+    return [question(i, tuple(options), (right,)) for i, (options, right) in enumerate(rows)]
 
 
 def fair(rng):

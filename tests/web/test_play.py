@@ -225,58 +225,48 @@ NOT_OURS = (
 )
 
 
-OTHERS = [
-    *(
-        (421, "GET", {"Host": host})
-        for host in ("evil.example:{port}", "127.0.0.1", "[::1]:{port}", "", None)
-    ),
-    *(
-        (403, method, {"Origin": origin})
-        for method in ("GET", "POST")
-        for origin in ("http://evil.example", "null", "https://127.0.0.1:{port}")
-    ),
-    *((404, "GET", {"path": path}) for path in NOT_OURS),
-    *((501, method, {}) for method in ("PUT", "DELETE", "OPTIONS", "HEAD")),
-    (404, "POST", {"path": "/{token}/shutdown"}),
-    (400, "GET", {"path": "http://[x]/{token}/state"}),
-]
+def get(**about):
+    return "GET", None, about
+
+
+def post(body=b"{}", path="/{token}/answer", **about):
+    return "POST", body, {"path": path, **about}
+
+
+ORIGINS = ("http://evil.example", "null", "https://127.0.0.1:{port}")
 PICKED = b'{"change": 1, "picks": [0]}'
-NO_ANSWERS = [
-    (403, b"{}", {"Origin": None}),
-    (411, None, {"Content_Length": None}),
-    (411, b"{}", {"Content_Length": "-2"}),
-    (411, b"{}", {"Transfer_Encoding": "chunked"}),
-    (413, None, {"Content_Length": str(LARGEST_BODY_BYTES + 1)}),
-    (413, None, {"Content_Length": "9" * 400}),
-    (415, b"{}", {"Content_Type": "text/plain"}),
-    (409, PICKED, {}),
-    *(
-        (400, body, {})
-        for body in (
-            *(b"{", b"[" * 5000, b"NaN", b"{}", b'{"change": true, "picks": []}'),
-            PICKED.replace(b"0", b'"0"'),
-            *(
-                PICKED[:-1] + b', "numbers": ' + numbers + b"}"
-                for numbers in (b'[["2.5"]]', b"[[true]]", b"[1]", b"[[1], [2]]")
-            ),
-            PICKED[:-1] + b', "numbers": [[1' + b"0" * 300 + b"]]}",
-        )
-    ),
-]
+NUMBERS = (b'[["2.5"]]', b"[[true]]", b"[1]", b"[[1], [2]]", b"[[1" + b"0" * 300 + b"]]")
+REFUSED = {
+    421: [
+        get(Host=host) for host in ("evil.example:{port}", "127.0.0.1", "[::1]:{port}", "", None)
+    ],
+    403: [
+        *(get(Origin=origin) for origin in ORIGINS),
+        *(post(path="/{token}/state", Origin=origin) for origin in ORIGINS),
+        post(Origin=None),
+    ],
+    404: [*(get(path=path) for path in NOT_OURS), post(path="/{token}/shutdown")],
+    501: [(method, None, {}) for method in ("PUT", "DELETE", "OPTIONS", "HEAD")],
+    411: [
+        post(None, Content_Length=None),
+        post(Content_Length="-2"),
+        post(Transfer_Encoding="chunked"),
+    ],
+    413: [post(None, Content_Length=n) for n in (str(LARGEST_BODY_BYTES + 1), "9" * 400)],
+    415: [post(Content_Type="text/plain")],
+    409: [post(PICKED)],
+    400: [
+        get(path="http://[x]/{token}/state"),
+        *map(post, (b"{", b"[" * 5000, b"NaN", b"{}", b'{"change": true, "picks": []}')),
+        post(PICKED.replace(b"0", b'"0"')),
+        *(post(PICKED[:-1] + b', "numbers": ' + numbers + b"}") for numbers in NUMBERS),
+    ],
+}
 
 
 @pytest.mark.parametrize(
     ("status", "method", "body", "headers"),
-    [
-        *(
-            (status, method, b"{}" if method == "POST" else None, about)
-            for status, method, about in OTHERS
-        ),
-        *(
-            (status, "POST", body, {"path": "/{token}/answer", **about})
-            for status, body, about in NO_ANSWERS
-        ),
-    ],
+    [(status, *one) for status, cases in REFUSED.items() for one in cases],
 )
 def test_others_and_what_is_no_answer_are_refused_and_change_nothing(
     server, session, status, method, body, headers
