@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import click
+import numpy as np
 from click.core import ParameterSource
 from PIL import Image
 
@@ -45,7 +46,7 @@ from phyblock.making import checks, files, season
 from phyblock.making.questions.audit import Probe, audit_questions
 from phyblock.making.questions.production import MAKERS, make_questions, problem_of
 from phyblock.making.scenes.candidates import make_candidates
-from phyblock.making.scenes.completing import Completed, completed, palette_of, read_given
+from phyblock.making.scenes.completing import complete, palette_of, read_given
 from phyblock.making.scenes.production import Production, builtin_forms, shares
 from phyblock.making.scenes.sketch import PALETTES, Palette, colorless
 from phyblock.sim.camera import VIEWS
@@ -57,6 +58,7 @@ from phyblock.sim.pictures import (
     candidates_png,
     composite_png,
     goal_png,
+    to_png,
     visible_shares,
 )
 from phyblock.sim.question_pictures import question_png
@@ -67,6 +69,7 @@ from phyblock.workers import Shards, Workers, open_workers
 
 T = TypeVar("T")
 R = TypeVar("R")
+_GAP_PX = 8
 
 
 @click.group("scenes")
@@ -128,8 +131,17 @@ def _mapped(function: Callable[[T], R], items: Sequence[T], jobs: int, doing: st
         return list(tracked(workers.map(function, items), len(items), doing))
 
 
-def _conclude(name: str, problems: Iterable[Problem | str]) -> None:
-    """Print the problems and the verdict on a set; exit with 1 if there are problems."""
+def _conclude(
+    name: str,
+    headings: tuple[str, ...],
+    rows: Iterable[tuple[tuple[str, ...], int, int]],
+    problems: Iterable[Problem | str],
+) -> None:
+    """Print rows of words with the numbers that failed, of all, then the problems and the verdict
+    on a set; exit with 1 if there are problems.
+    """
+    shown = [(*words, str(of - failed), str(of)) for words, failed, of in rows]
+    print_rows(make_console(), (*headings, "of"), shown, numbers=2)
     failures = list(problems)
     for failure in failures:
         click.echo(f"failed: {failure}", err=True)
@@ -298,21 +310,21 @@ def complete_set(data: Path, jobs: int, out: Path | None) -> None:
     given = read_given(data)
     folder = out or Path(f"{data.resolve().stem}-set")
     files.check_out(folder, files.SCENE_FILES)
-    done = _mapped(completed, given, jobs, "Completing")
-    if problems := [problem for one in done if isinstance(one, tuple) for problem in one]:
+    done = _mapped(complete, given, jobs, "Completing")
+    if problems := [problem for one in done for problem in one.problems]:
         raise DataError(problems)
-    whole = [one for one in done if isinstance(one, Completed)]
-    made = [one.scene for one in whole]
+    whole = [(one.scene, one.offered) for one in done if one.scene]
+    made = [scene for scene, _ in whole]
     palette = PALETTES[palette_of(made)]
     tasks = [
-        (one.scene, one.offered or make_candidates(one.scene, palette=palette)) for one in whole
+        (scene, offered or make_candidates(scene, palette=palette)) for scene, offered in whole
     ]
     command = f"phyblock scenes complete {shlex.quote(data.name)} --out {shlex.quote(folder.name)}"
     card = files.card("completed", name=folder.name, count=len(tasks), command=command)
     files.write_scenes(folder, tasks, card)
-    for one in whole:
+    for scene, one in zip(made, done, strict=True):
         for note in one.notes:
-            click.echo(f"note: scene {one.scene.id}: {note}")
+            click.echo(f"note: scene {scene.id}: {note}")
     for finding in checks.check_set(made):
         click.echo(f"note: scene {finding.where}: {finding.field} {finding.message}")
     click.echo(f"{counted(len(tasks), 'scene')} completed: {shown_path(folder)}")
@@ -343,13 +355,12 @@ def verify_scenes(data: str, jobs: int) -> None:
     found = [one for one in checks.check_set([scene for scene, _ in tasks]) if one.check in names]
     found += chain.from_iterable(_mapped(work, tasks, jobs, "Verifying"))
     failed = Counter(check for _, check in {(one.where, one.check) for one in found})
-    rows = [(check, str(len(tasks) - failed[check]), str(len(tasks))) for check in names]
+    rows = [((check,), failed[check], len(tasks)) for check in names]
     summed, changed = (0, ()) if is_official else files.check_sums(where)
     if summed:
-        rows.append(("checksums", str(summed - len(changed)), str(summed)))
-    rows.append(("all", str(len(tasks) - len({one.where for one in found})), str(len(tasks))))
-    print_rows(make_console(), ("check", "passed", "of"), rows, numbers=2)
-    _conclude(data, (*found, *changed))
+        rows.append((("checksums",), len(changed), summed))
+    rows.append((("all",), len({one.where for one in found}), len(tasks)))
+    _conclude(data, ("check", "passed"), rows, (*found, *changed))
 
 
 @scenes.command("show")
@@ -552,19 +563,16 @@ def verify_questions(path: str, data: str, jobs: int) -> None:
     read = _read(path, data)
     # Questions about one scene are processed together, so that pictures are shared.
     asked = sorted((task.question for task in read.tasks), key=lambda question: question.scene.id)
-    problems = _mapped(problem_of, asked, jobs, "Verifying")
-    counts = Counter(question.subtask for question in asked)
-    failed = Counter(q.subtask for q, p in zip(asked, problems, strict=True) if p)
+    problems = zip(asked, _mapped(problem_of, asked, jobs, "Verifying"), strict=True)
+    found = [(q, problem) for q, problem in problems if problem]
+    counts, failed = (Counter(q.subtask for q in some) for some in (asked, [q for q, _ in found]))
     summed, changed = files.check_sums(read.root)
-    rows: list[tuple[str, ...]] = [
-        (s, SUBTASK_NAMES[s], str(counts[s] - failed[s]), str(counts[s]))
-        for s in SUBTASKS
-        if counts[s]
+    rows: list[tuple[tuple[str, ...], int, int]] = [
+        ((s, SUBTASK_NAMES[s]), failed[s], counts[s]) for s in SUBTASKS if counts[s]
     ]
-    rows.append(("", "checksums", str(summed - len(changed)), str(summed)))
-    print_rows(make_console(), ("subtask", "", "derived again", "of"), rows, numbers=2)
-    failures = [f"{q.id}: {p}" for q, p in zip(asked, problems, strict=True) if p]
-    _conclude(path, (*sorted(failures), *changed))
+    rows.append((("", "checksums"), len(changed), summed))
+    failures = sorted(f"{question.id}: {problem}" for question, problem in found)
+    _conclude(path, ("subtask", "", "derived again"), rows, (*failures, *changed))
 
 
 @questions.command("show")
@@ -596,15 +604,11 @@ def show_question(question: str, path: str, data: str, out: Path | None) -> None
     ):
         console.print(line, soft_wrap=True)
     if out is not None:
-        style, gap_px = PictureStyle(), 8
-        images = [Image.open(io.BytesIO(question_png(one, style))) for one in shown.pictures]
-        step = style.size_px + gap_px
-        sheet = Image.new("RGB", (len(images) * step - gap_px, style.size_px), "white")
-        for i, image in enumerate(images):
-            sheet.paste(image, (i * step, 0))
-        file = io.BytesIO()
-        sheet.save(file, "PNG")
-        write_named(out, file.getvalue())
+        pngs = (io.BytesIO(question_png(one, PictureStyle())) for one in shown.pictures)
+        images = [np.asarray(Image.open(png)) for png in pngs]
+        gap = np.full_like(images[0][:, :_GAP_PX], 255)
+        sheet = np.hstack([part for image in images for part in (gap, image)][1:])
+        write_named(out, to_png(Image.fromarray(sheet)))
         console.print(f"pictures: {shown_path(out)}", soft_wrap=True)
 
 

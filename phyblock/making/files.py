@@ -45,7 +45,7 @@ def write_scenes(folder: Path, tasks: _Tasks, card: str) -> None:
     """Write scenes with their candidate sets, sorted by id. Raises StoreError if that fails."""
     by_id = sorted(tasks, key=lambda task: task[0].id)
     lines = (StoredScene.of(scene, candidates).as_json() for scene, candidates in by_id)
-    _write(folder, SCENE_FILES, (card, lines, SCENE_SET_VERSION))
+    _write(folder, SCENE_FILES, (card, "".join(f"{line}\n" for line in lines)), SCENE_SET_VERSION)
 
 
 def write_questions(
@@ -59,21 +59,21 @@ def write_questions(
     the names of picture files that are already there.
     """
     lines = (StoredQuestion.of(q, originals[q.scene.id]).as_json() for q in questions)
-    _write(folder, QUESTION_FILES, (card, lines, QUESTION_SET_VERSION), pictures)
+    texts = (card, "".join(f"{line}\n" for line in lines))
+    _write(folder, QUESTION_FILES, texts, QUESTION_SET_VERSION, pictures)
 
 
 def _write(
     folder: Path,
     names: Sequence[str],
-    content: tuple[str, Iterable[str], int],
+    texts: tuple[str, str],
+    version: int,
     pictures: Iterable[str] = (),
 ) -> None:
-    card, lines, version = content
-    texts = (card, "".join(f"{line}\n" for line in lines), f"{version}\n")
     check_out(folder, names)
     make_folder(folder)
     with writing(folder):
-        for name, text in zip(names, texts, strict=True):
+        for name, text in zip(names, (*texts, f"{version}\n"), strict=True):
             atomic_write(folder / name, text)
         atomic_write(folder / SUMS_FILE, sums_text(folder, (*names, *pictures)))
 

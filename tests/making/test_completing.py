@@ -77,10 +77,9 @@ def moved(number, *by_m):
     ],
 )  # fmt: skip
 def test_what_cannot_be_built_is_refused(blocks, said):
-    with pytest.raises(DataError) as caught:
-        complete(ReadScene("mine", of(*blocks), "mine.yaml:3:1"))
-    assert said in str(caught.value)
-    assert all(problem.where == "mine.yaml:3:1" for problem in caught.value.problems)
+    problems = complete(ReadScene("mine", of(*blocks), "mine.yaml:3:1")).problems
+    assert any(said in str(problem) for problem in problems)
+    assert all(problem.where == "mine.yaml:3:1" for problem in problems)
 
 
 def test_what_is_unusual_is_noted_and_what_is_given_wrong_is_derived():

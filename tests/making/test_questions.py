@@ -126,7 +126,9 @@ def test_pictures_that_were_changed_are_found_out(pictured):
     kept = next(b for b in first.blocks if b.order != colored.evidence["removed"])
     blocks = tuple(replace(b, color=unnamed) if b is kept else b for b in first.blocks)
     spoiled = replace(colored, pictures=(shown, replace(first, blocks=blocks), *rest))
-    assert problem_of(spoiled) == "picture A shows other colors than the text names"
+    assert problem_of(spoiled) == (
+        "picture A does not show the whole structure in the colors of the text"
+    )
     matching = next(q for q in pictured if q.wording == "vp-match")
     shown, *options = matching.pictures
     right = options[matching.answer[0]]
@@ -194,7 +196,7 @@ def test_places_that_no_mark_shows_are_found_out(built_in):
     first = next(t.question for t in built_in.tasks if t.question.subtask == "AD")
     scene, block = first.pictures
     bare = replace(first, pictures=(replace(scene, marks=scene.marks[1:]), block))
-    assert problem_of(bare) == "no place A is marked on a block"
+    assert problem_of(bare) == "no block is marked A"
 
 
 def lab(rgb, seen_as):

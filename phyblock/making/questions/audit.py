@@ -9,19 +9,20 @@ the set gives its answers away.
 
 from __future__ import annotations
 
-import json
 import math
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Hashable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from phyblock.domain.question import LETTERS, SUBTASKS, Question, QuestionPicture, Subtask
+from phyblock.domain.question import LETTERS, SUBTASKS, Question, Subtask
 from phyblock.errors import Problem, SpecError
 from phyblock.making.questions.guesses import measures_of, text_features
 from phyblock.making.questions.production import BALANCE
+from phyblock.sim.pictures import PictureStyle
+from phyblock.sim.question_pictures import question_key
 from phyblock.tracks.questions import FOLDS, Folds, Rule, guesses_of, majority_rule
 
 GUESSABLE = 0.35
@@ -150,28 +151,19 @@ def duplicates_of(questions: Sequence[Question]) -> dict[str, str]:
     """Return the ids of questions that repeat an earlier one, with options in any order, and the
     id of that one.
     """
-    first: dict[str, str] = {}
+    first: dict[Hashable, str] = {}
     earlier = {one.id: first.setdefault(_content(one), one.id) for one in questions}
     return {name: twin for name, twin in earlier.items() if twin != name}
 
 
-def _content(question: Question) -> str:
-    """Return everything that a reader of the question sees, with options sorted, as JSON."""
-
-    def rounded(numbers: Sequence[float]) -> tuple[float, ...]:
-        return tuple(round(number, 6) + 0.0 for number in numbers)
-
-    def recipe(picture: QuestionPicture) -> str:
-        blocks = sorted(
-            (b.type, b.color, rounded(b.position_m), rounded(b.euler_deg)) for b in picture.blocks
-        )
-        marks = sorted((rounded(mark.position_m), mark.letter) for mark in picture.marks)
-        return json.dumps([picture.view_deg, blocks, marks])
-
-    pictures = {picture.label: recipe(picture) for picture in question.pictures}
-    shown = [recipe for label, recipe in pictures.items() if label not in LETTERS]
-    options = [pictures.get(a, b) for a, b in zip(LETTERS, question.options, strict=False)]
-    return json.dumps([question.subtask, question.text, shown, sorted(options)])
+def _content(question: Question) -> Hashable:
+    """Return everything that a reader of the question sees, but for backgrounds, options sorted."""
+    shown = {
+        one.label: question_key(replace(one, background=None), PictureStyle())
+        for one in question.pictures
+    }
+    options = [shown.pop(a, b) for a, b in zip(LETTERS, question.options, strict=False)]
+    return question.subtask, question.text, tuple(sorted(options)), tuple(shown.values())
 
 
 def picture_probe(questions: Sequence[Question], folds: Folds) -> dict[str, Probe]:

@@ -10,10 +10,9 @@ from __future__ import annotations
 import itertools
 from abc import ABC, abstractmethod
 from collections.abc import Hashable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from types import MappingProxyType
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import yaml
@@ -46,25 +45,31 @@ class UnfairError(PhyblockError):
 
 @dataclass(frozen=True)
 class Draft:
-    """A fair question whose options have no letters yet.
+    """A question whose options have no letters yet.
 
-    `scene` is the scene as shown; `options` has the right one first, or for ordering all four in
-    the right order. `slots` fill the template of the `wording`. `facts` are further evidence, which
-    JSON can hold. Selection takes an even share of each `kind`, by default the wording. `looks` are
-    measures of the pictures, a row for each option, by which a reader might guess: drafts are
-    dropped until these reveal nothing. The same base scenes have at most one question with the same
-    wording, slots and `about`.
+    `scene` is the scene as shown. `options` has the right one first, or for ordering all four in
+    the right order; those of a `StaticMaker` are in any order until it finds the right one, and
+    may be missing until then. `slots` fill the template of the `wording`. `facts` are further
+    evidence, which JSON can hold. Selection takes an even share of each `kind`, by default the
+    wording. `looks` are measures of the pictures, a row for each option, by which a reader might
+    guess: drafts are dropped until these reveal nothing. The same base scenes have at most one
+    question with the same wording, slots and `about`.
     """
 
-    scene: Scene
     wording: str
-    options: tuple[Option, ...]
+    scene: Scene
     pictures: tuple[QuestionPicture, ...]
     slots: Slots = field(default_factory=dict)
-    facts: Mapping[str, Any] = field(default_factory=dict)
+    options: Sequence[Option] = ()
     kind: str = ""
+    facts: Mapping[str, Any] = field(default_factory=dict)
     looks: tuple[tuple[float, ...], ...] = ()
     about: Hashable = None
+
+    @property
+    def picture(self) -> QuestionPicture:
+        """The first picture."""
+        return self.pictures[0]
 
     @property
     def group(self) -> str:
@@ -111,20 +116,6 @@ class Maker(ABC):
         """
 
 
-class Asked(NamedTuple):
-    """A question about one picture, not yet answered.
-
-    `options` are in any order; if there are none, the maker offers some once it has the answer.
-    """
-
-    stem: str
-    scene: Scene
-    picture: QuestionPicture
-    slots: Slots = MappingProxyType({})
-    options: Sequence[str] = ()
-    kind: str = ""
-
-
 _VIEWS_A_SCENE, _DRAFTS_A_VIEW = 3, 8
 
 
@@ -135,44 +126,45 @@ class StaticMaker(Maker):
     drafts_a_scene = _VIEWS_A_SCENE * _DRAFTS_A_VIEW
 
     @abstractmethod
-    def ask(self, scene: Scene, view: View, rng: np.random.Generator) -> Iterator[Asked]:
-        """Propose questions, fair or not, about a scene that is seen from a view."""
+    def ask(self, scene: Scene, view: View, rng: np.random.Generator) -> Iterator[Draft]:
+        """Propose questions, fair or not, with a picture of a scene, recolored or not, from a view.
+
+        `options` are in any order; if there are none, `offer` gives some once `right` is known.
+        """
 
     @abstractmethod
-    def right(self, asked: Asked) -> str:
+    def right(self, asked: Draft) -> str:
         """Return the text of the right option. Raises UnfairError as `rederive`."""
 
-    def offer(self, asked: Asked, right: str, rng: np.random.Generator) -> Sequence[str]:
+    def offer(self, asked: Draft, right: str, rng: np.random.Generator) -> Sequence[str]:
         """Return four options, the right one among them, or none if there are too few."""
         raise NotImplementedError
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """Yield fair questions about a scene, view by view."""
         for _ in range(_VIEWS_A_SCENE):
-            found = 0
-            for one in self.ask(scene, drawn_view(rng), rng):
-                try:
-                    right = self.right(one)
-                except UnfairError:
-                    continue
-                options = one.options or self.offer(one, right, rng)
-                if right not in options:
-                    continue
-                first, kind = tuple(right_first(right, options)), one.kind or one.stem
-                yield Draft(one.scene, one.stem, first, (one.picture,), dict(one.slots), kind=kind)
-                if (found := found + 1) == _DRAFTS_A_VIEW:
-                    break
+            yield from itertools.islice(self._fair(scene, drawn_view(rng), rng), _DRAFTS_A_VIEW)
+
+    def _fair(self, scene: Scene, view: View, rng: np.random.Generator) -> Iterator[Draft]:
+        for asked in self.ask(scene, view, rng):
+            try:
+                right = self.right(asked)
+            except UnfairError:
+                continue
+            options = asked.texts or self.offer(asked, right, rng)
+            if right in options:
+                shown = replace(scene, blocks=asked.picture.blocks[: len(scene)])
+                yield replace(asked, scene=shown, options=tuple(right_first(right, options)))
 
     def rederive(self, question: Question) -> tuple[int, ...]:
         """Return the answer, derived only from the one picture and the slots of the text."""
         labels = [picture.label for picture in question.pictures]
         if labels != ["scene"]:
             raise UnfairError(f"has pictures {labels}, not one of the scene alone")
-        (picture,), slots = question.pictures, slots_of(question)
-        low, high = ELEVATIONS_DEG
-        if not low <= picture.view_deg[1] <= high:
+        (low, high), slots = ELEVATIONS_DEG, slots_of(question)
+        if not low <= question.pictures[0].view_deg[1] <= high:
             raise UnfairError(f"is not seen from {low} to {high} degrees above the floor")
-        asked = Asked(question.wording, question.scene, picture, slots, question.options)
+        asked = Draft(question.wording, question.scene, question.pictures, slots, question.options)
         right = self.right(asked)
         return only_index([option == right for option in question.options])
 
@@ -186,11 +178,7 @@ def fill_template(template: str, slots: Slots) -> str:
 def slots_of(question: Question) -> Slots:
     """Return the slots of a text. Raises UnfairError unless its wording with them is the text."""
     slots = question.evidence.get("slots", {})
-    try:
-        is_filled = fill_template(WORDINGS[question.wording], slots) == question.text
-    except KeyError:
-        is_filled = False
-    if not is_filled:
+    if fill_template(WORDINGS[question.wording], slots) != question.text:
         raise UnfairError("the text is not its wording with the slots of the evidence")
     return {name: str(slot) for name, slot in slots.items()}
 

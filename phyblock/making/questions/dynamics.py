@@ -31,6 +31,7 @@ from phyblock.domain.question import LETTERS, Mark, Question, QuestionPicture, S
 from phyblock.domain.scene import Block, Scene
 from phyblock.making.questions import base, sight
 from phyblock.making.questions.base import Draft, Floats, Maker, UnfairError, pick, shuffled
+from phyblock.making.scenes.sketch import lowered
 from phyblock.sim import question_pictures as drawn
 from phyblock.sim.balance import MARGIN_M, is_balanced, surely_falls, surely_stands
 from phyblock.sim.camera import view_axes
@@ -38,7 +39,6 @@ from phyblock.sim.contact import (
     GROUND,
     Turned,
     bounds_m,
-    drop_height_m,
     find_overlaps,
     support_graph,
     whole_bounds_m,
@@ -59,20 +59,12 @@ _below = functools.lru_cache(maxsize=64)(support_graph)
 
 # Verdicts of statics and simulation
 
-_LIFT_M, _DIRECTIONS = 0.6, 8
+_DIRECTIONS = 8
 
 
-def lowered(block: Block, onto: Sequence[Block], x_m: float, y_m: float) -> Block:
-    """Return the block lowered in its orientation, the middle of its outline over (x, y) [m].
-
-    It stops where it first touches one of the blocks, or the floor.
-    """
-    middle = bounds_m(block).mean(axis=0)
-    x = round(block.position_m[0] + x_m - float(middle[0]), 6)
-    y = round(block.position_m[1] + y_m - float(middle[1]), 6)
-    lifted = replace(block, position_m=(x, y, block.position_m[2] + _LIFT_M))
-    fall = drop_height_m(lifted, onto)
-    return replace(lifted, position_m=(x, y, round(lifted.position_m[2] - fall, 6)))
+def new_block(pose: Turned, order: int, rng: np.random.Generator) -> Block:
+    """Return a block of a random color in a pose, at the origin."""
+    return replace(at_place(pose), order=order, color=pick(rng, COLORS))
 
 
 def lowered_round(put: Block, onto: Sequence[Block], radius_m: float) -> Iterator[Block]:
@@ -99,12 +91,6 @@ def stays_round(put: Block, onto: Sequence[Block], radius_m: float) -> bool | No
         for moved in lowered_round(put, onto, radius_m)
     )
     return stays if is_alike else None
-
-
-def verdict(blocks: Sequence[Block], order: int) -> bool | None:
-    """True if all stay; None if statics are unsure or simulations do not confirm them."""
-    stays = surely_stays(blocks, order)
-    return stays if stays is not None and holds(blocks, order) is stays else None
 
 
 def group_of(blocks: Sequence[Block], order: int) -> tuple[Block, ...]:
@@ -183,45 +169,35 @@ class CounterfactualMaker(Maker):
                 mark = drawn.block_mark(plain, seen(plain), order, TAKEN)
                 if (
                     mark
-                    and sight.are_seen(plain, [order], sight.NAMED)
-                    and sight.are_seen(plain, sight.orders_of(scene.blocks), _ALL_SEEN)
+                    and sight.are_seen(plain, sight.NAMED, [order])
+                    and sight.are_seen(plain, _ALL_SEEN)
                 ):
                     break
             else:
                 continue
-            shown, moved = (
-                replace(plain, marks=(mark,)),
-                falling(group_of(scene.blocks, order), order),
-            )
-            if moved is not None and sight.are_seen(shown, moved, sight.COUNTED):
-                right, *others = base.right_first(_outcome_text(len(moved)), OUTCOME_TEXTS)
-                options = (right, *shuffled(rng, others))
-                facts = {"removed": order, "moved": sorted(moved)}
-                yield Draft(scene, "cf-count", options, (shown,), facts=facts, about=order)
-                if four := _by_colors(shown, order, moved, rng):
-                    colors, pictures = four
-                    slots = dict(zip(("color", "other", "taken"), colors, strict=True))
-                    one = Draft(scene, "cf-color", pictures, (shown,), slots, facts, about=order)
-                    yield one
+            shown, moved = replace(plain, marks=(mark,)), falling(scene.blocks, order)
+            if moved is None or not sight.are_seen(shown, sight.COUNTED, moved):
+                continue
+            facts = {"removed": order, "moved": sorted(moved)}
+            right, *others = base.right_first(_outcome_text(len(moved)), OUTCOME_TEXTS)
+            options = (right, *shuffled(rng, others))
+            yield Draft("cf-count", scene, (shown,), {}, options, facts=facts, about=order)
+            colors, pictures = _by_colors(shown, order, moved, rng)
+            if pictures:
+                slots = dict(zip(("color", "other", "taken"), colors, strict=True))
+                yield Draft("cf-color", scene, (shown,), slots, pictures, "", facts, about=order)
 
     def rederive(self, question: Question) -> tuple[int, ...]:
         """Simulate the removal again."""
         slots, shown = base.slots_of(question), sight.picture_of(question, "scene")
-        order = sight.marked_order(shown, TAKEN)
-        left = [block for block in group_of(shown.blocks, order) if block.order != order]
-        moved: Lot | None = None
-        if surely_stands(group_of(shown.blocks, order)):
-            outcome = after_removal(shown.blocks, order)
-            is_near = set(outcome.moved) <= set(sight.orders_of(left))
-            if outcome.is_clear and is_near and is_sure(left, outcome.moved):
-                moved = frozenset(outcome.moved)
-        if moved is None:
+        order = sight.marked(shown, TAKEN)[1]
+        moved = falling(shown.blocks, order)
+        outcome = None if moved is None else after_removal(shown.blocks, order)
+        if moved is None or not outcome or not outcome.is_clear or set(outcome.moved) != moved:
             raise UnfairError(f"it is not sure what follows without block {order}")
         if not any(order in block.depend for block in shown.blocks):
             raise UnfairError(f"block {order} supports no other")
-        if balances_on_edges(shown.blocks, order, moved):
-            raise UnfairError(f"what block {order} leaves behind lies on nothing but edges")
-        sight.require_seen(shown, sight.NAMED, [b for b in shown.blocks if b.order == order])
+        sight.require_seen(shown, sight.NAMED, [sight.block_of(shown.blocks, order)])
         if question.wording != "cf-color":
             right = _outcome_text(len(moved))
             return base.only_index([option == right for option in question.options])
@@ -236,12 +212,14 @@ def _outcome_text(count: int) -> str:
     return OUTCOME_TEXTS[min(count, len(OUTCOME_TEXTS) - 1)]
 
 
-def falling(blocks: Sequence[Block], order: int) -> Lot | None:
-    """Return the orders of the blocks that by statics move when one is removed; None if unsure.
+def falling(whole: Sequence[Block], order: int) -> Lot | None:
+    """Return the orders of the blocks that by statics move when one is removed.
 
-    These are blocks next to it, with all that rests on them.
+    These are blocks next to it, with all that rests on them. None if that is not sure, or if
+    something would stay on edges alone.
     """
-    left, below = [block for block in blocks if block.order != order], _below(tuple(blocks))
+    blocks = group_of(whole, order)
+    left, below = [block for block in blocks if block.order != order], _below(blocks)
     near = [o for o in below if order in below[o]] or [o for o in below[order] if o in below]
     with_load = [(frozenset({o}) | resting_on(blocks, o)) - {order} for o in near]
     for lot in sorted(_joined(with_load, len(with_load)), key=sorted):
@@ -274,12 +252,12 @@ def _joined(lots: Sequence[Lot], most: int, enough: int | None = None) -> set[Lo
 
 def _by_colors(
     shown: QuestionPicture, order: int, moved: Lot, rng: np.random.Generator
-) -> tuple[Sequence[str], tuple[QuestionPicture, ...]] | None:
+) -> tuple[Sequence[str], tuple[QuestionPicture, ...]]:
     """Return colors, and four pictures that highlight blocks: first those that move, then three
-    other sets with all that rests on them. None if none are found.
+    other sets with all that rests on them. No pictures if there are no such sets.
     """
     plain = replace(shown, marks=())
-    share, left = sight.shares(plain), [b for b in plain.blocks if b.order != order]
+    share, left = sight.sizes(plain).shown, [b for b in plain.blocks if b.order != order]
     with_load = [frozenset({b.order}) | resting_on(left, b.order) for b in left]
     found = _joined(with_load, _MOST_TOGETHER, _MOST_LOTS)
     fair = [lot for lot in found if lot != moved and all(share[o] >= sight.COUNTED for o in lot)]
@@ -293,7 +271,7 @@ def _by_colors(
         replace(one, blocks=sight.colored(one.blocks, {order: colors[2]}))
         for one in (sight.with_lot(plain, lots[place], colors) for place in four)
     ]
-    return (colors, tuple(options)) if options and sight.are_told_apart(options) else None
+    return colors, tuple(options) if options and sight.are_told_apart(options) else ()
 
 
 def _looks_of_lot(plain: QuestionPicture, taken: int, lot: Lot) -> tuple[float, ...]:
@@ -326,30 +304,25 @@ WEIGHTS: tuple[tuple[BlockType, Euler], ...] = (
     *(("cuboid2", (0.0, 0.0, 90.0)), ("cuboid3", (0.0, 90.0, 0.0))),
 )
 _PLANKS: tuple[BlockType, ...] = ("cuboid3", "cuboid3", "cuboid2")
-_MOST_LEFT_OUT = 5
+_MOST_LEFT_OUT, _WEIGHTS_LAID = 5, 2
 _FLAT_M, _LEAST_TOP_M, _HIGHEST_M = 0.0005, 0.045, 0.2
 
 
 class Bench(NamedTuple):
     """A nearly finished structure, with loose blocks to lay along a line over one of its flat tops.
 
-    The first loose block is a plank that lies on the top, the others are weights on the plank: a
-    balance, or a cantilever held by a weight. `reach_m` is half the length of the top along the
-    line; `lengths_m` are those of the loose blocks.
+    The first loose block is a plank that lies on the top, the other two are weights on the plank: a
+    balance, or a cantilever held by a weight. Offsets along the line count from the middle of the
+    top.
     """
 
     base: tuple[Block, ...]
     top: Block
     along: int
     loose: tuple[Block, ...]
-    reach_m: float
-    lengths_m: Floats
-    masses_kg: Floats
 
     def laid(self, offs_m: Sequence[float]) -> tuple[Block, ...] | None:
-        """Return all blocks, the loose ones at these offsets from the middle of the top [m]; None
-        if any overlap.
-        """
+        """Return all blocks, the loose ones at these offsets [m]; None if any overlap."""
         middle, blocks = bounds_m(self.top).mean(axis=0), self.base
         for block, off_m in zip(self.loose, offs_m, strict=True):
             x, y = (float(middle[i]) + (off_m if i == self.along else 0.0) for i in (0, 1))
@@ -360,31 +333,33 @@ class Bench(NamedTuple):
     @property
     def limits_m(self) -> tuple[float, float]:
         """Offsets of the center of mass [m] up to which all stay, and from which they fall."""
-        return self.reach_m - MARGIN_M - SPARE_M, self.reach_m + MARGIN_M + SPARE_M
+        reach_m = float(np.ptp(bounds_m(self.top)[:, self.along])) / 2
+        return reach_m - MARGIN_M - SPARE_M, reach_m + MARGIN_M + SPARE_M
 
     @property
     def middle_m(self) -> float:
-        """Offset of the middle of the structure from that of the top, along the line [m]."""
+        """Offset of the middle of the structure [m]."""
         ends = np.array([bounds_m(block)[:, self.along] for block in self.base])
         top = bounds_m(self.top)[:, self.along]
         return float((ends.min() + ends.max()) / 2 - top.mean())
 
     def plans_m(self, count: int, rng: np.random.Generator) -> Floats:
-        """Return random offsets of loose blocks from the middle of the top, (plans, blocks) [m].
+        """Return random offsets of loose blocks, (plans, blocks) [m].
 
         `count` plans are drawn, and those with two weights in one place are left out.
         """
-        half = int(self.lengths_m[0] / UNIT_M / 2)
+        plank_m, *weights_m = (np.ptp(bounds_m(one)[:, self.along]) for one in self.loose)
+        half = int(plank_m / UNIT_M / 2)
         steps = rng.integers(1 - half, half, size=(count, len(self.loose)))
         plans: Floats = steps.astype(np.float64) * UNIT_M
         plans[:, 1:] += plans[:, :1]
-        if len(self.loose) > 2:
-            plans = plans[np.ptp(plans[:, 1:], axis=1) >= self.lengths_m[1:].mean() + SPARE_M]
-        return plans
+        is_apart = np.ptp(plans[:, 1:], axis=1) >= np.mean(weights_m) + SPARE_M
+        return np.asarray(plans[is_apart])
 
     def leans_m(self, plans_m: Floats) -> Floats:
-        """Return the offset of the center of mass from the middle of the top, by plan [m]."""
-        leans: Floats = plans_m @ self.masses_kg / self.masses_kg.sum()
+        """Return the offset of the center of mass, by plan [m]."""
+        masses = np.array([SHAPES[block.type].mass_kg for block in self.loose])
+        leans: Floats = plans_m @ masses / masses.sum()
         return leans
 
 
@@ -421,35 +396,22 @@ def pillars(along: int, thick_m: float) -> list[Turned]:
 
 
 def bench(
-    base: tuple[Block, ...],
-    top: Block,
-    weights: int,
-    pillar_m: float,
-    first: int,
-    rng: np.random.Generator,
+    base: tuple[Block, ...], top: Block, first: int, rng: np.random.Generator, *, has_pillar: bool
 ) -> Bench:
-    """Return a bench on a top, with a plank and this number of weights, with orders from `first`.
-
-    If `pillar_m` is above 0, the plank lies on a pillar of this thickness.
-    """
+    """Return a bench on a top or on a thin pillar on it, with new blocks of orders from `first`."""
     along = int(rng.integers(2))
-    if pillar_m:
-        block_type, turned = pick(rng, pillars(along, pillar_m))
-        pillar = Block(first, block_type, pick(rng, COLORS), (0.0, 0.0, 0.0), turned, (), 1)
+    if has_pillar:
+        pillar = new_block(pick(rng, pillars(along, THIN_M)), first, rng)
         at = bounds_m(top).mean(axis=0)[:2]
-        at[along] += int(rng.integers(-1, 2)) * _PILLAR_OFF_M * (pillar_m < WIDE_M)
+        at[along] += int(rng.integers(-1, 2)) * _PILLAR_OFF_M
         top, first = lowered(pillar, base, *at.tolist()), first + 1
         base = (*base, top)
-    low, high = bounds_m(top)
-    kinds = [(pick(rng, _PLANKS), _FLAT), *(pick(rng, WEIGHTS) for _ in range(weights))]
+    kinds = [(pick(rng, _PLANKS), _FLAT), *(pick(rng, WEIGHTS) for _ in range(_WEIGHTS_LAID))]
     loose = tuple(
-        Block(first + i, block_type, pick(rng, COLORS), (0.0, 0.0, float(high[2])), turned, (), 1)
-        for i, (block_type, (roll, pitch, yaw)) in enumerate(kinds)
-        for turned in [(roll, pitch, (yaw + 90.0 * along) % 180.0)]
+        new_block((block_type, (roll, pitch, (yaw + 90.0 * along) % 180.0)), order, rng)
+        for order, (block_type, (roll, pitch, yaw)) in enumerate(kinds, first)
     )
-    lengths = np.array([float(np.diff(bounds_m(block), axis=0)[0, along]) for block in loose])
-    masses = np.array([SHAPES[block.type].mass_kg for block in loose])
-    return Bench(base, top, along, loose, float(high[along] - low[along]) / 2, lengths, masses)
+    return Bench(base, top, along, loose)
 
 
 _BENCHES_TRIED, _SHOWN, _ONE_STAYS = 80, 60, [True, False, False, False]
@@ -490,10 +452,10 @@ class PredictiveMaker(Maker):
         for option in sight.option_pictures(question):
             added = [block for block in option.blocks if block.order not in placed]
             kept = tuple(block for block in option.blocks if block.order in placed)
-            if not added or not sight.same_blocks(kept, shown.blocks):
+            if not added or kept != shown.blocks:
                 raise UnfairError(f"picture {option.label} does not add to the structure")
-            stays.append(verdict(option.blocks, added[0].order))
-            if stays[-1] is None:
+            stays.append(surely_stays(option.blocks, added[0].order))
+            if stays[-1] is None or holds(option.blocks, added[0].order) is not stays[-1]:
                 raise UnfairError(f"it is not sure whether all stays in picture {option.label}")
         return base.only_index(stays)
 
@@ -505,9 +467,9 @@ def _next_steps(scene: Scene, ranks: Ranks, rng: np.random.Generator) -> Draft |
     stages = tuple(scene.blocks[vertex] for vertex in sorted(order[:kept]))
     if not (tops := free_tops(stages)):
         return None
-    pillar_m = THIN_M if rng.random() < _ON_A_PILLAR else 0.0
+    has_pillar = rng.random() < _ON_A_PILLAR
     first = max(sight.orders_of(scene.blocks)) + 1
-    on = bench(stages, pick(rng, tops), 2, pillar_m, first, rng)
+    on = bench(stages, pick(rng, tops), first, rng, has_pillar=has_pillar)
     every = [blocks for offs_m in four_plans(on, ranks, rng) if (blocks := on.laid(offs_m))]
     if len(every) < len(LETTERS):
         return None
@@ -525,7 +487,7 @@ def _next_steps(scene: Scene, ranks: Ranks, rng: np.random.Generator) -> Draft |
         and all(is_balanced(group_of(every[0], every[0][-1].order), lean) for lean in _LEANS)
     ):
         facts, kind = {"placed": sight.orders_of(on.base)}, f"plank {ranks[0]}"
-        return Draft(scene, "pd-next", tuple(options), (plain,), {}, facts, kind)
+        return Draft("pd-next", scene, (plain,), {}, options, kind, facts)
     return None
 
 
@@ -610,23 +572,14 @@ class AffordanceMaker(Maker):
     def rederive(self, question: Question) -> tuple[int, ...]:
         """Decide by statics and simulation at every place, and by statics all around it."""
         slots = base.slots_of(question)
-        shown, alone = (
-            sight.picture_of(question, "scene"),
-            sight.picture_of(question, drawn.BLOCK_LABEL),
-        )
-        if len(alone.blocks) != 1:
-            raise UnfairError("the second picture is not of one block")
+        shown, alone = (sight.picture_of(question, name) for name in ("scene", drawn.BLOCK_LABEL))
         block = alone.blocks[0]
-        if slots.get("size") != _size(block):
-            raise UnfairError("the block does not have the size that the text gives")
+        if len(alone.blocks) != 1 or slots.get("size") != _size(block):
+            raise UnfairError("the second picture is not of one block of the size in the text")
         sight.require_seen(shown, _ALL_SEEN)
         plain, stays = replace(shown, marks=()), []
         for letter in LETTERS:
-            places = [mark.position_m for mark in shown.marks if mark.letter == letter]
-            places = [at for at in places if drawn.seen_order(plain, seen(plain), at) is not None]
-            if not places:
-                raise UnfairError(f"no place {letter} is marked on a block")
-            stays.append(stays_at(plain, block, places[0]))
+            stays.append(stays_at(plain, block, sight.marked(shown, letter)[0]))
             if stays[-1] is None:
                 raise UnfairError(f"it is not sure whether the block stays at place {letter}")
         return base.only_index(stays)
@@ -653,22 +606,23 @@ def _set_down(scene: Scene, rank: int, rng: np.random.Generator) -> Draft | None
             blocks = _with_plank(blocks, at_m, order, int(across.argmax()), rng)
             order = max(order, max(sight.orders_of(blocks)) + 1)
     plain = QuestionPicture("scene", blocks, view)
-    if not is_inside(plain) or not sight.are_seen(plain, sight.orders_of(blocks), _ALL_SEEN):
+    if not is_inside(plain) or not sight.are_seen(plain, _ALL_SEEN):
         return None
     points, order = points_of(plain, rng), max(sight.orders_of(blocks)) + 1
     for pose in shuffled(rng, _SET_DOWN):
-        block = replace(at_place(pose), order=order, color=pick(rng, COLORS))
+        block = new_block(pose, order, rng)
         four, kind = four_of(plain, points, outcomes_of(blocks, block, points), rank, rng)
         if not four:
             continue
         if not all(map(surely_stands, groups(blocks))):
             return None
-        marks = tuple(Mark("A", (x, y, z)) for x, y, z in points.at_m[four].tolist())
+        marks = tuple(Mark("A", (x, y, round(z, 6))) for x, y, z in points.at_m[four].tolist())
         puts = [lowered(block, blocks, *mark.position_m[:2]) for mark in marks]
         if [stays_round(put, blocks, _WIDE_RING_M) for put in puts] == _ONE_STAYS:
             shown = (plain, QuestionPicture(drawn.BLOCK_LABEL, (block,), view))
             facts = {"block": block.type, "euler": list(block.euler_deg)}
-            return Draft(scene, "ad-place", marks, shown, {"size": _size(block)}, facts, kind)
+            slots = {"size": _size(block)}
+            return Draft("ad-place", scene, shown, slots, marks, kind, facts)
     return None
 
 
@@ -694,8 +648,7 @@ def _with_plank(
         parts.append((other, pick(rng, on_m or [at_m]) if is_on else beside_m))
     laid = blocks
     for order, (pose, (x, y)) in enumerate(parts, first):
-        block = replace(at_place(pose), order=order, color=pick(rng, COLORS))
-        laid = (*laid, lowered(block, laid, x, y))
+        laid = (*laid, lowered(new_block(pose, order, rng), laid, x, y))
         below, middle = _below(laid), bounds_m(laid[-1]).mean(axis=0)
         is_held = _out_m(middle[None], *_borne_by(laid[-1], laid, below))[0] <= -_HELD_M
         is_own = order <= first + len(offs_m) or below[order] <= {GROUND, *range(first, order)}
@@ -725,11 +678,12 @@ def points_of(plain: QuestionPicture, rng: np.random.Generator) -> Points:
         if (
             not (SHAPES[block.type].is_box and is_square(block) and room.min() > 0)
             or across[hangs].min(initial=1.0) < _PLAINLY_ACROSS
-            or not sight.are_seen(plain, sight.all_below(block.order, below), sight.COUNTED)
+            or not sight.are_seen(plain, sight.COUNTED, sight.all_below(block.order, below))
         ):
             continue
         count = math.ceil(np.ptp(box, axis=0).prod() / _AREA_M2)
-        for x, y in (box[0] + _INSIDE_M + room * rng.random((count, 2))).round(4).tolist():
+        drawn_m = box[0] + _INSIDE_M + room * rng.random((count, 2))
+        for x, y in (drawn_m.round(4) + 0.0).tolist():
             at = (x, y, float(bounds_m(block)[1, 2]))
             rows, columns = (slice(n - _ROUND_PX, n + _ROUND_PX + 1) for n in mark_pixel(plain, at))
             if (shot[rows, columns] == i).all():
@@ -838,7 +792,7 @@ def stays_at(plain: QuestionPicture, block: Block, at: Place) -> bool | None:
     """
     put = lowered(block, plain.blocks, *at[:2])
     stays = stays_round(put, plain.blocks, _PLACE_RING_M)
-    if verdict((*plain.blocks, put), put.order) is not stays:
+    if stays is None or holds((*plain.blocks, put), put.order) is not stays:
         return None
     around = (put, *lowered_round(put, plain.blocks, _PLACE_RING_M))
     heights_m = [abs(float(bounds_m(one)[0, 2]) - at[2]) for one in around]

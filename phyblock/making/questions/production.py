@@ -16,12 +16,13 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import islice
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
 
 from phyblock.domain.question import LETTERS, Mark, Question, QuestionPicture, Subtask
-from phyblock.domain.scene import Block, Scene
+from phyblock.domain.scene import Scene
 from phyblock.errors import DataError, PhyblockError, Problem
 from phyblock.making.questions import dynamics, properties, relations, views
 from phyblock.making.questions.base import Draft, Maker, pick, shuffled
@@ -44,7 +45,7 @@ MAKERS: dict[Subtask, Maker] = {
 """The makers of questions, by subtask; plugins add theirs."""
 _LEAST_FILLED = 0.05
 """Minimum share of a picture that its blocks fill."""
-_DIGITS = 6
+_order = attrgetter("order")
 _PLACES = range(len(LETTERS))
 
 
@@ -140,29 +141,12 @@ def as_question(
         text=draft.text,
         options=tuple(options),
         answer=tuple(places) if subtask == "OR" else (places[0],),
-        pictures=tuple(replace(_tidy(one), background=background) for one in pictures),
+        pictures=tuple(
+            replace(one, blocks=tuple(sorted(one.blocks, key=_order)), background=background)
+            for one in pictures
+        ),
         wording=draft.wording,
         evidence={"slots": dict(draft.slots), **draft.facts},
-    )
-
-
-def _rounded(vector: tuple[float, ...]) -> Any:
-    return tuple(round(float(number), _DIGITS) + 0.0 for number in vector)
-
-
-def _tidy(picture: QuestionPicture) -> QuestionPicture:
-    """Return the picture with numbers as in the file, and blocks sorted by their orders."""
-
-    def tidy(block: Block) -> Block:
-        place, angles = _rounded(block.position_m), _rounded(block.euler_deg)
-        return replace(block, position_m=place, euler_deg=angles)
-
-    return replace(
-        picture,
-        blocks=tuple(sorted(map(tidy, picture.blocks), key=lambda block: block.order)),
-        marks=tuple(replace(mark, position_m=_rounded(mark.position_m)) for mark in picture.marks),
-        framed=tuple(map(tidy, picture.framed)),
-        view_deg=_rounded(picture.view_deg),
     )
 
 
@@ -178,6 +162,9 @@ def problem_of(question: Question) -> str | None:
         derived = maker.rederive(question)
     except PhyblockError as error:
         return str(error)
+    except (KeyError, TypeError, ValueError) as error:
+        # A wording, slots or words in them that are not of this kind of question.
+        return f"its wording or its slots cannot be read ({error!r})"
     if derived != question.answer:
         letters = "".join(LETTERS[index] for index in derived)
         return f"the answer is {letters}, not {question.answer_letters}"

@@ -10,17 +10,17 @@ from __future__ import annotations
 import functools
 import itertools
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from operator import sub
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from phyblock.domain.blocks import BLOCK_TYPES, COLORS, SHAPES
 from phyblock.domain.question import QuestionPicture, Subtask
-from phyblock.domain.scene import Block, Scene
+from phyblock.domain.scene import Block, CycleError, Scene
 from phyblock.making.questions import base, sight
-from phyblock.making.questions.base import Asked, Slots, StaticMaker, UnfairError, View, pick
+from phyblock.making.questions.base import Draft, Slots, StaticMaker, UnfairError, View, pick
+from phyblock.making.scenes.sketch import graph_of
 from phyblock.sim.contact import GROUND, bounds_m, support_graph
 
 _LYING_M = 0.03
@@ -35,20 +35,20 @@ class ShapeMaker(StaticMaker):
 
     subtask: Subtask = "SH"
 
-    def ask(self, scene: Scene, view: View, rng: np.random.Generator) -> Iterator[Asked]:
+    def ask(self, scene: Scene, view: View, rng: np.random.Generator) -> Iterator[Draft]:
         """Ask about each block that can be named, in newly drawn colors."""
         for order in base.shuffled(rng, sight.orders_of(scene.blocks)):
-            shown = sight.recolored(scene, rng)
-            picture = sight.goal_picture(shown, view)
-            block = sight.block_of(shown.blocks, order)
+            picture = sight.recolored(scene, view, rng)
+            block = sight.block_of(picture.blocks, order)
             if name := sight.drawn_name(rng, block, picture, ("color", *_FURTHER)):
                 word, slots = sight.shape_word(block.type), {"block": name}
                 others = base.shuffled(rng, [one for one in sight.SHAPE_WORDS if one != word])
-                yield Asked("sh", shown, picture, slots, [word, *others[:3]], f"sh {_said(name)}")
+                options, kind = [word, *others[:3]], f"sh {_said(name)}"
+                yield Draft("sh", scene, (picture,), slots, options, kind)
 
-    def right(self, asked: Asked) -> str:
+    def right(self, asked: Draft) -> str:
         """Return the shape of the block that the text names."""
-        (block,) = sight.resolve_seen([asked.slots["block"]], asked.picture, sight.STUDIED)
+        (block,) = sight.named(asked, sight.STUDIED)
         if not sight.shows_profile(block, asked.picture.view_deg):
             raise UnfairError("is seen from a side that does not tell its shape")
         is_standing = block.type == "semi_cylinder" and sight.height_m(block) > _LYING_M
@@ -70,26 +70,23 @@ class ColorMaker(StaticMaker):
 
     subtask: Subtask = "CO"
 
-    def ask(self, scene: Scene, view: View, rng: np.random.Generator) -> Iterator[Asked]:
+    def ask(self, scene: Scene, view: View, rng: np.random.Generator) -> Iterator[Draft]:
         """Ask about pairs of blocks that can be named, at most one of them as the outermost."""
         for _ in range(_PAIRS_TRIED):
-            shown = sight.recolored(scene, rng)
-            picture = sight.goal_picture(shown, view)
+            picture = sight.recolored(scene, view, rng)
             two = base.shuffled(rng, sight.seen_blocks(picture, sight.NAMED))[:2]
             named = [sight.drawn_name(rng, block, picture, ("type", *_FURTHER)) for block in two]
             said = {_said(name or "") for name in named}
             if len(two) == 2 and None not in named and said != {"most"}:
                 slots = {"block": str(named[0]), "other": str(named[1])}
                 kind = next((one for one in ("most", "layer", "resting") if one in said), "")
-                yield Asked("co", shown, picture, slots, kind=f"co {kind}")
+                yield Draft("co", scene, (picture,), slots, kind=f"co {kind}")
 
-    def right(self, asked: Asked) -> str:
+    def right(self, asked: Draft) -> str:
         """Return the colors of the blocks that the text names."""
-        texts = [asked.slots[name] for name in ("block", "other")]
-        blocks = sight.resolve_seen(texts, asked.picture)
-        return " and ".join(block.color for block in blocks)
+        return " and ".join(block.color for block in sight.named(asked))
 
-    def offer(self, asked: Asked, right: str, rng: np.random.Generator) -> Sequence[str]:
+    def offer(self, asked: Draft, right: str, rng: np.random.Generator) -> Sequence[str]:
         """Return four of the six ordered pairs of colors in the picture, with the right one."""
         colors = sorted({block.color for block in asked.picture.blocks})
         pairs = [" and ".join(two) for two in itertools.permutations(colors, 2)]
@@ -100,12 +97,8 @@ class ColorMaker(StaticMaker):
 _COMPARISONS: Mapping[str, tuple[str, Callable[[Block], float], int]] = {
     "tallest": ("si-height", sight.height_m, 1),
     "shortest": ("si-height", sight.height_m, -1),
-    "longest": (
-        "si-length",
-        # The longest side of the box that a block fits in, however it lies.
-        lambda block: max(map(sub, SHAPES[block.type].high_m, SHAPES[block.type].low_m)),
-        1,
-    ),
+    # The longest side of the box that a block fits in, however it lies.
+    "longest": ("si-length", lambda block: max(SHAPES[block.type].sides_m), 1),
     "the most space": ("si-volume", lambda block: SHAPES[block.type].volume_m3, 1),
     "the least space": ("si-volume", lambda block: SHAPES[block.type].volume_m3, -1),
 }
@@ -119,51 +112,48 @@ class SizeMaker(StaticMaker):
 
     subtask: Subtask = "SI"
 
-    def ask(self, scene: Scene, view: View, rng: np.random.Generator) -> Iterator[Asked]:
+    def ask(self, scene: Scene, view: View, rng: np.random.Generator) -> Iterator[Draft]:
         """Compare four blocks and two blocks in turn."""
         studied = sight.seen_blocks(sight.goal_picture(scene, view), sight.STUDIED)
         for number in range(2 * _TRIES if len(studied) > 1 else 0):
             is_choice = number % 2 == 0
             chosen = sight.orders_of(base.shuffled(rng, studied)[: 4 if is_choice else 2])
             if is_choice:
-                shown = sight.recolored(scene, rng)
+                picture = sight.recolored(scene, view, rng)
             else:
-                shown = sight.with_own_colors(scene, chosen, rng)
-            picture = sight.goal_picture(shown, view)
-            blocks = [sight.block_of(shown.blocks, order) for order in chosen]
+                picture = sight.with_own_colors(scene.blocks, chosen, view, rng)
+            blocks = [sight.block_of(picture.blocks, order) for order in chosen]
             named = [sight.drawn_name(rng, block, picture, ("color", "side")) for block in blocks]
             if any(name is None or "highest" in name for name in named):
                 continue
             if not is_choice:
                 slots = {"block": str(named[0]), "other": str(named[1])}
-                yield Asked("si-times", shown, picture, slots)
+                yield Draft("si-times", scene, (picture,), slots)
             elif len(named) == 4:
                 how, options = pick(rng, list(_COMPARISONS)), [f"the {name}" for name in named]
-                yield Asked(_COMPARISONS[how][0], shown, picture, {"comparison": how}, options, how)
+                stem, slots = _COMPARISONS[how][0], {"comparison": how}
+                yield Draft(stem, scene, (picture,), slots, options, how)
 
-    def right(self, asked: Asked) -> str:
+    def right(self, asked: Draft) -> str:
         """Compare the blocks that the text or the options name."""
-        is_choice, pair = "comparison" in asked.slots, ("block", "other")
-        named = asked.options if is_choice else [asked.slots[name] for name in pair]
-        blocks = sight.resolve_seen(named, asked.picture, sight.STUDIED)
-        if not is_choice:
-            ratio = sight.height_m(blocks[0]) / sight.height_m(blocks[1])
+        if "comparison" not in asked.slots:
+            one, other = sight.named(asked, sight.STUDIED)
+            ratio = sight.height_m(one) / sight.height_m(other)
             right = [word for word, known in _TIMES.items() if abs(ratio - known) < _EXACT]
             if not right:
                 raise UnfairError(f"is {ratio:.2f} times as tall, which no option says")
             return right[0]
-        if asked.slots["comparison"] not in _COMPARISONS:
-            raise UnfairError(f"{asked.slots['comparison']!r} is no comparison")
+        blocks = sight.resolve_seen(asked.texts, asked.picture, sight.STUDIED)
         _, measure, sign = _COMPARISONS[asked.slots["comparison"]]
         sizes = [measure(block) for block in blocks]
         most, next_one = sorted(sizes, key=lambda size: -sign * size)[:2]
         if max(most, next_one) < _LEAST_RATIO * min(most, next_one):
             raise UnfairError("two of the blocks are about as large")
-        return asked.options[sizes.index(most)]
+        return asked.texts[sizes.index(most)]
 
-    def offer(self, asked: Asked, right: str, rng: np.random.Generator) -> Sequence[str]:
+    def offer(self, asked: Draft, right: str, rng: np.random.Generator) -> Sequence[str]:
         """Return four neighboring ratios of the five."""
-        words = list(_TIMES) if asked.stem == "si-times" else []
+        words = list(_TIMES) if asked.wording == "si-times" else []
         start = pick(rng, [i for i in (0, 1) if right in words[i : i + 4]])
         return words[start : start + 4]
 
@@ -185,28 +175,18 @@ def layers_of(blocks: Sequence[Block]) -> Mapping[int, int]:
     slopes rests on them, yet it looks as if it were beside them.
     """
     below = support_graph(blocks)
-    top = {block.order: bounds_m(block)[1, 2] for block in blocks} | {GROUND: 0.0}
-    bottom = {block.order: bounds_m(block)[0, 2] for block in blocks}
+    height = {block.order: bounds_m(block)[:, 2] for block in blocks} | {GROUND: np.zeros(2)}
     plain = {
-        order: {other for other in others if bottom[order] > top[other] - _WEDGED_M} or {GROUND}
-        for order, others in below.items()
+        order: [o for o in under if height[order][0] > height[o][1] - _WEDGED_M]
+        for order, under in below.items()
     }
-
-    def longest(under: Mapping[int, Collection[int]]) -> dict[int, int]:
-        layer = {GROUND: 0}
-        while len(layer) <= len(under):
-            ready = [
-                o for o in under if o not in layer and under[o] and layer.keys() >= set(under[o])
-            ]
-            if not ready:
-                raise UnfairError("some block rests on nothing, or on itself")
-            layer.update({o: 1 + max(layer[other] for other in under[o]) for o in ready})
-        return {order: number for order, number in layer.items() if order != GROUND}
-
-    counted = longest(below)
-    if counted != longest(plain):
-        raise UnfairError("some block rests on others and stands lower than they reach")
-    return counted
+    try:
+        counted, looked = (graph_of(one).layers for one in (below, plain))
+    except CycleError:
+        raise UnfairError("some block rests on itself") from None
+    if not all(below.values()) or counted != looked:
+        raise UnfairError("some block rests on nothing, or stands lower than its supports reach")
+    return dict(zip(below, counted, strict=True))
 
 
 def sure_blocks(picture: QuestionPicture) -> int:
@@ -217,7 +197,7 @@ def sure_blocks(picture: QuestionPicture) -> int:
     otherwise float. Raises UnfairError if more blocks are hidden, or nothing shows that one is
     needed.
     """
-    seen = sight.shares(picture)
+    seen = sight.sizes(picture).shown
     hidden = [order for order, share in seen.items() if share < sight.COUNTED]
     if len(hidden) > 1:
         raise UnfairError("several blocks are hidden")
@@ -307,28 +287,27 @@ class TallyMaker(StaticMaker):
 
     def __init__(self, subtask: Subtask) -> None:
         self.subtask = subtask
-        self._stems = [s for s in TALLIES if s.partition("-")[0] == subtask.lower()]
+        self._tallies = {s: one for s, one in TALLIES.items() if s[:2] == subtask.lower()}
 
-    def ask(self, scene: Scene, view: View, rng: np.random.Generator) -> Iterator[Asked]:
+    def ask(self, scene: Scene, view: View, rng: np.random.Generator) -> Iterator[Draft]:
         """Ask for one count after another."""
-        colored = sight.recolored(scene, rng)
-        for stem in base.shuffled(rng, self._stems):
-            shown = colored if TALLIES[stem].is_recolored else scene
-            picture, kind = sight.goal_picture(shown, view), ""
+        colored, plain = sight.recolored(scene, view, rng), sight.goal_picture(scene, view)
+        for stem, tally in base.shuffled(rng, [*self._tallies.items()]):
+            picture, kind = colored if tally.is_recolored else plain, ""
             if stem == "oc-hidden":
-                kind = f"{stem}-{sum(x < sight.COUNTED for x in sight.shares(picture).values())}"
-            if texts := TALLIES[stem].slots(picture):
-                yield Asked(stem, shown, picture, pick(rng, texts), kind=kind)
+                kind = (
+                    f"{stem}-{sum(x < sight.COUNTED for x in sight.sizes(picture).shown.values())}"
+                )
+            if texts := tally.slots(picture):
+                yield Draft(stem, scene, (picture,), pick(rng, texts), kind=kind)
 
-    def right(self, asked: Asked) -> str:
+    def right(self, asked: Draft) -> str:
         """Count again."""
-        if asked.stem not in self._stems:
-            raise UnfairError(f"the wording {asked.stem!r} counts nothing")
-        return str(TALLIES[asked.stem].count(asked.picture, asked.slots))
+        return str(self._tallies[asked.wording].count(asked.picture, asked.slots))
 
-    def offer(self, asked: Asked, right: str, rng: np.random.Generator) -> Sequence[str]:
+    def offer(self, asked: Draft, right: str, rng: np.random.Generator) -> Sequence[str]:
         """Return four consecutive numbers."""
-        return base.window(rng, TALLIES[asked.stem].values, int(right))
+        return base.window(rng, self._tallies[asked.wording].values, int(right))
 
 
 _COUNTS, _TEXTS_TRIED = range(1, 11), 8
@@ -342,7 +321,7 @@ class NumberMaker(StaticMaker):
 
     subtask: Subtask = "NU"
 
-    def ask(self, scene: Scene, view: View, rng: np.random.Generator) -> Iterator[Asked]:
+    def ask(self, scene: Scene, view: View, rng: np.random.Generator) -> Iterator[Draft]:
         """Ask for a color, a shape, or both, in newly drawn colors."""
         for _ in range(_TEXTS_TRIED):
             color, *others = sight.palette(rng)
@@ -352,22 +331,21 @@ class NumberMaker(StaticMaker):
             mine = sight.orders_of([block for block in scene.blocks if block.type in types])
             fours = [_COUNTS[i : i + 4] for i in range(min(len(mine), len(_COUNTS)) - 3)]
             if kind == "shape":
-                shown, what = sight.recolored(scene, rng), noun
+                picture, what = sight.recolored(scene, view, rng), noun
                 options = base.window(rng, _COUNTS, len(mine))
             elif fours:
                 four = pick(rng, fours)
                 ours = dict.fromkeys(base.shuffled(rng, mine)[: pick(rng, four)], color)
                 other = {order: pick(rng, others) for order in mine}
                 drawn = {b.order: pick(rng, (color, *others)) for b in scene.blocks} | other | ours
-                shown = replace(scene, blocks=sight.colored(scene.blocks, drawn))
+                picture = QuestionPicture("scene", sight.colored(scene.blocks, drawn), view)
                 what, options = f"{color} {noun}", list(map(str, four))
             else:
                 continue
             if options:
-                picture = sight.goal_picture(shown, view)
-                yield Asked("nu", shown, picture, {"what": what}, options, kind)
+                yield Draft("nu", scene, (picture,), {"what": what}, options, kind)
 
-    def right(self, asked: Asked) -> str:
+    def right(self, asked: Draft) -> str:
         """Count the blocks that a text such as `red blocks`, `cubes` or `red cubes` names."""
         what, picture = asked.slots["what"], asked.picture
         first, _, rest = what.partition(" ")

@@ -19,7 +19,7 @@ from phyblock.domain.question import QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
 from phyblock.domain.symmetry import angles_deg
 from phyblock.making.questions import base, sight
-from phyblock.making.questions.base import Asked, Floats, StaticMaker, T, UnfairError, View, pick
+from phyblock.making.questions.base import Draft, Floats, StaticMaker, T, UnfairError, View, pick
 from phyblock.sim.balance import surely_stands
 from phyblock.sim.camera import view_axes
 from phyblock.sim.contact import bounds_m, boxes_near, support_graph, whole_bounds_m
@@ -30,14 +30,13 @@ _RECOLORED = 6
 
 def _named(
     scene: Scene, view: View, rng: np.random.Generator, least: int
-) -> Iterator[tuple[Scene, QuestionPicture, Mapping[int, str]]]:
-    """Yield the scene in other colors, its picture, and the names of `least` or more blocks."""
+) -> Iterator[tuple[QuestionPicture, Mapping[int, str]]]:
+    """Yield the picture of a scene in other colors, and the names of `least` or more blocks."""
     for _ in range(_RECOLORED):
-        shown = sight.recolored(scene, rng)
-        picture = sight.goal_picture(shown, view)
+        picture = sight.recolored(scene, view, rng)
         names = sight.plain_names(picture)
         if len(names) >= least:
-            yield shown, picture, names
+            yield picture, names
 
 
 def _pairs(items: Sequence[T], rng: np.random.Generator) -> list[tuple[T, T]]:
@@ -58,9 +57,18 @@ _PLACES: Mapping[str, Sequence[str]] = {
 }
 _CLEAR_M, _ABOVE_M, _LEVEL_M, _GAP_M = 0.03, 0.015, 0.005, 0.024
 _SIDES = ("farthest to the left", "farthest to the right")
-_RANKED = ("rp-highest", "rp-lowest", "rp-front", "rp-back")
+_UPRIGHT = ("rp-highest", "rp-lowest")
 _NEARER = 0.75
 """Maximum distance of the nearest block, as a share of that of the next one."""
+_RANKED: Mapping[str, Callable[[Block, Floats], float]] = {
+    "rp-highest": lambda block, _: -_top_m(block),
+    "rp-lowest": lambda block, _: _top_m(block),
+    "rp-front": lambda block, away: float(sight.center_m(block) @ away),
+    "rp-back": lambda block, away: -float(sight.center_m(block) @ away),
+}
+"""Measures of the blocks that are asked for, from a block and the direction away from the viewer;
+the least is right.
+"""
 
 
 class PositionMaker(StaticMaker):
@@ -68,13 +76,13 @@ class PositionMaker(StaticMaker):
 
     subtask: Subtask = "RP"
 
-    def ask(self, scene: Scene, view: View, rng: np.random.Generator) -> Iterator[Asked]:
+    def ask(self, scene: Scene, view: View, rng: np.random.Generator) -> Iterator[Draft]:
         """Ask about pairs of blocks, and for one of four."""
-        for shown, picture, named in _named(scene, view, rng, 2):
+        for picture, named in _named(scene, view, rng, 2):
             for one, other in _pairs(list(named), rng):
                 slots = {"block": named[one], "other": named[other]}
                 for stem, places in _PLACES.items():
-                    yield Asked(stem, shown, picture, slots, places)
+                    yield Draft(stem, scene, (picture,), slots, places)
             for _ in range(5 if len(named) > 4 else 0):
                 anchor, *four = base.shuffled(rng, list(named))[:5]
                 options = [f"the {named[order]}" for order in four]
@@ -83,39 +91,34 @@ class PositionMaker(StaticMaker):
                 if kind == "rp-nearest":
                     slots = {"other": named[anchor]}
                 stem = "rp-extreme" if kind in _SIDES else kind
-                yield Asked(stem, shown, picture, slots, options, kind)
+                yield Draft(stem, scene, (picture,), slots, options, kind)
 
-    def right(self, asked: Asked) -> str:
+    def right(self, asked: Draft) -> str:
         """Compare the places of the blocks that the text or the options name."""
-        if asked.stem in _PLACES:
-            one, other = sight.resolve_seen(
-                (asked.slots["block"], asked.slots["other"]), asked.picture
-            )
-            place = _place(asked.stem, one, other, asked.picture.view_deg)
-            return _PLACES[asked.stem][place]
-        four = sight.resolve_seen(asked.options, asked.picture)
-        if asked.stem == "rp-extreme":
+        blocks, picture = sight.named(asked), asked.picture
+        if asked.wording in _PLACES:
+            place = _place(asked.wording, blocks[0], blocks[-1], picture.view_deg)
+            return _PLACES[asked.wording][place]
+        four = sight.resolve_seen(asked.texts, picture)
+        if asked.wording == "rp-extreme":
             extreme = asked.slots["extreme"]
-            found = sight.outermost(four, asked.picture, to_left=extreme == _SIDES[0])
-            if found is None or extreme not in _SIDES:
+            found = sight.outermost(four, picture, to_left=_SIDES.index(extreme) == 0)
+            if found is None:
                 raise UnfairError(f"two blocks are about the {extreme}")
-            return asked.options[four.index(found)]
-        if asked.stem == "rp-nearest":
-            (anchor,) = sight.resolve_seen((asked.slots["other"],), asked.picture)
-            middle = sight.center_m(anchor)
+            return asked.texts[four.index(found)]
+        if asked.wording == "rp-nearest":
+            middle = sight.center_m(blocks[0])
             reach = [float(np.linalg.norm(sight.center_m(b) - middle)) for b in four]
             is_clear = min(reach) <= _NEARER * sorted(reach)[1]
         else:
-            sign = -1.0 if asked.stem in ("rp-highest", "rp-back") else 1.0
-            away = _floor_axes(asked.picture.view_deg)[1]
-            is_upright = asked.stem in _RANKED[:2]
-            sight.require_supports_seen(asked.picture, four if is_upright else ())
-            far = [_top_m(b) if is_upright else float(sight.center_m(b) @ away) for b in four]
-            reach = [sign * one for one in far]
-            is_clear = asked.stem in _RANKED and sorted(reach)[1] - min(reach) >= _GAP_M
+            away = _floor_axes(picture.view_deg)[1]
+            reach = [_RANKED[asked.wording](block, away) for block in four]
+            is_clear = sorted(reach)[1] - min(reach) >= _GAP_M
+        if asked.wording in _UPRIGHT:
+            sight.require_supports_seen(picture, four)
         if not is_clear:
-            raise UnfairError(f"two blocks are about as {asked.stem.removeprefix('rp-')}")
-        return asked.options[reach.index(min(reach))]
+            raise UnfairError(f"two blocks are about as {asked.wording.removeprefix('rp-')}")
+        return asked.texts[reach.index(min(reach))]
 
 
 def _floor_axes(view: View) -> tuple[Floats, Floats]:
@@ -193,35 +196,34 @@ class DistanceMaker(StaticMaker):
 
     subtask: Subtask = "AP"
 
-    def ask(self, scene: Scene, view: View, rng: np.random.Generator) -> Iterator[Asked]:
+    def ask(self, scene: Scene, view: View, rng: np.random.Generator) -> Iterator[Draft]:
         """Ask for heights of blocks and distances of pairs."""
-        for shown, picture, named in _named(scene, view, rng, 2):
+        for picture, named in _named(scene, view, rng, 2):
             for stem in LENGTHS:
                 for one, other in _pairs(list(named.values()), rng):
                     slots = {"block": one}
                     if stem in _HEIGHTS:
-                        yield Asked(stem, shown, picture, slots, kind="height")
+                        yield Draft(stem, scene, (picture,), slots, kind="height")
                         break
-                    yield Asked(stem, shown, picture, {**slots, "other": other})
+                    yield Draft(stem, scene, (picture,), {**slots, "other": other})
 
-    def right(self, asked: Asked) -> str:
+    def right(self, asked: Draft) -> str:
         """Measure between the blocks that the text names."""
-        picture, slots = asked.picture, asked.slots
-        names = ("block",) if asked.stem in _HEIGHTS else ("block", "other")
-        blocks = sight.resolve_seen([slots[name] for name in names], picture)
+        picture = asked.picture
+        blocks = sight.named(asked)
         sight.require_supports_seen(picture, blocks)
         if not any(one.type in _SCALES for one in sight.seen_blocks(picture, sight.NAMED)):
             raise UnfairError("no block that gives the scale can be seen")
-        length_cm = 100 * LENGTHS[asked.stem](blocks[0], blocks[-1], asked.picture.blocks)
+        length_cm = 100 * LENGTHS[asked.wording](blocks[0], blocks[-1], picture.blocks)
         on_grid_cm = _STEP_CM * round(length_cm / _STEP_CM)
         if abs(length_cm - on_grid_cm) > _EXACT_CM:
             raise UnfairError(f"{length_cm:.1f} cm is no multiple of 2.5 cm")
         return f"{on_grid_cm:g} cm"
 
-    def offer(self, asked: Asked, right: str, rng: np.random.Generator) -> Sequence[str]:
+    def offer(self, _: Draft, right: str, rng: np.random.Generator) -> Sequence[str]:
         """Return one of the sets of four lengths that hold the right one."""
         fours = [[f"{length:g} cm" for length in four] for four in _LADDERS_CM]
-        fitting = [four for four in fours if right in four and asked.stem in LENGTHS]
+        fitting = [four for four in fours if right in four]
         return pick(rng, fitting) if fitting else ()
 
 
@@ -240,10 +242,10 @@ class DependencyMaker(StaticMaker):
 
     subtask: Subtask = "RD"
 
-    def ask(self, scene: Scene, view: View, rng: np.random.Generator) -> Iterator[Asked]:
+    def ask(self, scene: Scene, view: View, rng: np.random.Generator) -> Iterator[Draft]:
         """Ask about a random block, with four others to choose from."""
         below = support_graph(scene.blocks)
-        for shown, picture, named in _named(scene, view, rng, 5):
+        for picture, named in _named(scene, view, rng, 5):
             for stem, is_related in base.shuffled(rng, [*_RELATIONS.items()]):
                 anchor = pick(rng, list(named))
                 rest = base.shuffled(rng, [order for order in named if order != anchor])
@@ -251,17 +253,16 @@ class DependencyMaker(StaticMaker):
                 wrong = [order for order in rest if order not in right]
                 four = [f"the {named[order]}" for order in (*right[:1], *wrong[:3])]
                 if right and len(four) == 4:
-                    yield Asked(stem, shown, picture, {"block": named[anchor]}, four)
+                    yield Draft(stem, scene, (picture,), {"block": named[anchor]}, four)
 
-    def right(self, asked: Asked) -> str:
+    def right(self, asked: Draft) -> str:
         """Find the contacts of the blocks that the text and the options name."""
-        anchor, *four = sight.resolve_seen((asked.slots["block"], *asked.options), asked.picture)
-        if asked.stem not in _RELATIONS or anchor in four:
-            raise UnfairError("asks about no dependency, or a block about itself")
-        below = support_graph(asked.picture.blocks)
-        is_related = _RELATIONS[asked.stem]
+        anchor, *four = sight.resolve_seen((asked.slots["block"], *asked.texts), asked.picture)
+        if anchor in four:
+            raise UnfairError("asks about a block itself")
+        below, is_related = support_graph(asked.picture.blocks), _RELATIONS[asked.wording]
         (index,) = base.only_index([is_related(b.order, anchor.order, below) for b in four])
-        return asked.options[index]
+        return asked.texts[index]
 
 
 # RR
@@ -313,11 +314,9 @@ def _tipped(euler_deg: Euler, along: int) -> Sequence[tuple[str, Euler]]:
     rotation = euler_deg_to_matrix(euler_deg)
     found = [(AXIS_TURNS[0], euler_deg)]
     for name, axis in zip(AXIS_TURNS[1:], (2, along, 1 - along), strict=True):
-        one, two = (axis + 1) % 3, (axis + 2) % 3
-        for side in (1.0, -1.0):
-            turn = np.eye(3)
-            turn[one, one] = turn[two, two] = math.cos(math.radians(90.0))
-            turn[two, one], turn[one, two] = side, -side
+        for angle_deg in (90.0, -90.0):
+            roll, pitch, yaw = (angle_deg * (axis == one) for one in range(3))
+            turn = euler_deg_to_matrix((roll, pitch, yaw))
             found.append((name, angles_deg(turn @ rotation)))
     return found
 
@@ -345,7 +344,7 @@ class RotationMaker(StaticMaker):
 
     subtask: Subtask = "RR"
 
-    def ask(self, scene: Scene, view: View, rng: np.random.Generator) -> Iterator[Asked]:
+    def ask(self, scene: Scene, view: View, rng: np.random.Generator) -> Iterator[Draft]:
         """Ask about blocks, with a loose one beside the structure that fits a random phrase."""
         studied = sight.seen_blocks(sight.goal_picture(scene, view), sight.STUDIED)
         for other, stem in itertools.product(base.shuffled(rng, studied)[:_COMPARED], _OFFERED):
@@ -365,23 +364,18 @@ class RotationMaker(StaticMaker):
                 if not surely_stands((loose,)):
                     continue
                 # Each of the two gets its own color.
-                every = replace(scene, blocks=(*scene.blocks, loose))
-                shown = sight.with_own_colors(every, [loose.order, other.order], rng)
-                color = {block.order: block.color for block in shown.blocks}
-                mine, its = (
-                    f"{color[one.order]} {sight.shape_word(one.type)}" for one in (loose, other)
-                )
-                colored = replace(scene, blocks=shown.blocks[:-1])
-                picture = sight.goal_picture(shown, view)
+                orders, every = [loose.order, other.order], (*scene.blocks, loose)
+                picture = sight.with_own_colors(every, orders, view, rng)
+                two = [sight.block_of(picture.blocks, order) for order in orders]
+                mine, its = (f"{one.color} {sight.shape_word(one.type)}" for one in two)
                 kind = "axis" if stem == "rr-axis" else "vertical"
                 slots = {"block": mine, "other": its}
-                yield Asked(stem, colored, picture, slots, _OFFERED[stem], kind)
+                yield Draft(stem, scene, (picture,), slots, _OFFERED[stem], kind)
 
-    def right(self, asked: Asked) -> str:
+    def right(self, asked: Draft) -> str:
         """Compare the orientations in the picture, up to the symmetry of the type."""
-        texts = [asked.slots[name] for name in ("block", "other")]
-        pair = sight.resolve_seen(texts, asked.picture, sight.STUDIED)
-        true = {phrase for phrase in phrases(asked.stem, *pair) if phrase in asked.options}
+        pair = sight.named(asked, sight.STUDIED)
+        true = {phrase for phrase in phrases(asked.wording, *pair) if phrase in asked.texts}
         if len(true) != 1:
             raise UnfairError("are not of one type, or not turned as the wording asks")
         return true.pop()
@@ -400,7 +394,7 @@ def put_beside(block: Block, blocks: Sequence[Block], rng: np.random.Generator) 
     for steps in itertools.count():
         place_m = middle[:2] + _ASIDE_M * steps * direction
         step = np.array([*(place_m - box.mean(axis=0)[:2]), -box[0, 2]])
-        x, y, z = (round(float(part), 4) for part in np.array(loose.position_m) + step)
+        x, y, z = (round(float(part), 4) + 0.0 for part in np.array(loose.position_m) + step)
         placed = replace(loose, position_m=(x, y, z))
         if not any(boxes_near(bounds_m(placed), bounds_m(other), _FREE_M) for other in blocks):
             return placed

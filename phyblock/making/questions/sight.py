@@ -11,17 +11,24 @@ import functools
 import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from phyblock.domain.blocks import COLORS, SHAPES, BlockType, Color, euler_deg_to_matrix
 from phyblock.domain.question import LETTERS, Question, QuestionPicture
 from phyblock.domain.scene import Block, Scene
-from phyblock.making.questions.base import Floats, Slots, UnfairError, View, pick, shuffled
+from phyblock.making.questions.base import (
+    Draft,
+    Floats,
+    Slots,
+    UnfairError,
+    View,
+    pick,
+    shuffled,
+)
 from phyblock.sim.camera import view_axes
 from phyblock.sim.contact import GROUND, bounds_m, support_graph
-from phyblock.sim.engine import Pose
 from phyblock.sim.pictures import PictureStyle, drawn_m, goal_camera, shoot, visible_shares
 from phyblock.sim.question_pictures import is_inside, least_difference, seen, seen_order
 
@@ -40,7 +47,6 @@ _LEAST_PROFILE = 0.26
 _SIZE_PX = 256
 _MIDDLE_GAP, _EDGE_GAP = 0.1, 0.05
 """Minimum lead of the outermost block's middle and edge, in halves of the picture's width."""
-_SAME_M, _SAME_DEG = 0.002, 2.0
 
 
 PLAIN_COLORS: tuple[Color, ...] = ("red", "yellow", "blue")
@@ -71,28 +77,28 @@ def colored(blocks: Sequence[Block], colors: Mapping[int, Color]) -> tuple[Block
     return tuple(replace(block, color=colors.get(block.order, block.color)) for block in blocks)
 
 
-def recolored(scene: Scene, rng: np.random.Generator) -> Scene:
-    """Return the scene with each block in a random one of three colors, so that colors do not
-    reveal shapes.
+def goal_picture(scene: Scene, view: View) -> QuestionPicture:
+    """Return the picture of the whole scene from a view."""
+    return QuestionPicture("scene", scene.blocks, view)
+
+
+def recolored(scene: Scene, view: View, rng: np.random.Generator) -> QuestionPicture:
+    """Return the picture of the scene with each block in a random one of three colors, so that
+    colors do not reveal shapes.
     """
     colors = palette(rng)
     drawn = [colors[i] for i in rng.integers(len(colors), size=len(scene))]
     by_order = dict(zip(orders_of(scene.blocks), drawn, strict=True))
-    return replace(scene, blocks=colored(scene.blocks, by_order))
+    return QuestionPicture("scene", colored(scene.blocks, by_order), view)
 
 
-def with_own_colors(scene: Scene, orders: Sequence[int], rng: np.random.Generator) -> Scene:
-    """Return the scene with a color for each of two blocks, and a third for all others."""
+def with_own_colors(
+    blocks: Sequence[Block], two: Sequence[int], view: View, rng: np.random.Generator
+) -> QuestionPicture:
+    """Return the picture of blocks with a color for each of two, and a third for all others."""
     first, second, rest = palette(rng)
-    own = dict.fromkeys(orders_of(scene.blocks), rest) | dict(
-        zip(orders, (first, second), strict=True)
-    )
-    return replace(scene, blocks=colored(scene.blocks, own))
-
-
-def goal_picture(scene: Scene, view: View) -> QuestionPicture:
-    """Return the picture of the whole scene from a view."""
-    return QuestionPicture("scene", scene.blocks, view)
+    own = dict.fromkeys(orders_of(blocks), rest) | dict(zip(two, (first, second), strict=True))
+    return QuestionPicture("scene", colored(blocks, own), view)
 
 
 @functools.lru_cache(maxsize=4096)
@@ -108,50 +114,48 @@ def height_m(block: Block) -> float:
     return float(high - low)
 
 
-# Shares of blocks in a picture framed on all that it draws
+# Sizes of blocks in a picture framed on all that it draws
 
 
-def shares(picture: QuestionPicture) -> Mapping[int, float]:
-    """Return the visible share of each block, by order."""
-    return _shares(*_plain(picture))
+class Sizes(NamedTuple):
+    """By a block's order, its visible share, its share of the picture, and its left and right end
+    in the picture (-1 to 1).
+    """
+
+    shown: Mapping[int, float]
+    area: Mapping[int, float]
+    ends: Mapping[int, tuple[float, float]]
 
 
-def _plain(picture: QuestionPicture) -> tuple[tuple[Block, ...], View]:
-    """Return the blocks, without facts that do not affect visibility, and the view."""
+def sizes(picture: QuestionPicture) -> Sizes:
+    """Return the sizes of the blocks in a picture."""
+    # Without what does not change them, so that recolored structures share them.
     blocks = tuple(replace(block, color="red", depend=()) for block in picture.blocks)
-    return blocks, picture.view_deg
+    return _sizes(Scene("", (1,), blocks, ()), picture.view_deg)
 
 
 @functools.lru_cache(maxsize=512)
-def _shares(blocks: tuple[Block, ...], view: View) -> Mapping[int, float]:
+def _sizes(scene: Scene, view: View) -> Sizes:
     style = PictureStyle(_SIZE_PX, "checkerboard", *view)
-    return visible_shares(Scene("", (1,), blocks, ()), style)
-
-
-@functools.lru_cache(maxsize=512)
-def _extents(
-    blocks: tuple[Block, ...], view: View
-) -> tuple[Mapping[int, float], Mapping[int, tuple[float, float]]]:
-    """Return each block's share of the picture and its left and right end (-1 to 1), by order."""
-    style = PictureStyle(_SIZE_PX, "checkerboard", *view)
-    camera = goal_camera(Scene("", (1,), blocks, ()), style)
-    pixels = shoot(blocks, camera, _SIZE_PX).block
-    counts = np.bincount(pixels[pixels >= 0], minlength=len(blocks)) / _SIZE_PX**2
-    across = [camera.project(drawn_m(one))[:, 0] for one in blocks]
-    ends = [(float(one.min()), float(one.max())) for one in across]
-    orders = orders_of(blocks)
-    return dict(zip(orders, counts.tolist(), strict=True)), dict(zip(orders, ends, strict=True))
+    camera = goal_camera(scene, style)
+    pixels = shoot(scene.blocks, camera, _SIZE_PX).block
+    counts = np.bincount(pixels[pixels >= 0], minlength=len(scene)) / _SIZE_PX**2
+    across = {block.order: camera.project(drawn_m(block))[:, 0] for block in scene.blocks}
+    ends = {order: (float(one.min()), float(one.max())) for order, one in across.items()}
+    area = dict(zip(across, counts.tolist(), strict=True))
+    return Sizes(visible_shares(scene, style), area, ends)
 
 
 def seen_blocks(picture: QuestionPicture, least: float) -> list[Block]:
     """Return the blocks of which at least this share is visible in a picture."""
-    seen_share = shares(picture)
-    return [block for block in picture.blocks if seen_share[block.order] >= least]
+    shown = sizes(picture).shown
+    return [block for block in picture.blocks if shown[block.order] >= least]
 
 
-def are_seen(picture: QuestionPicture, orders: Collection[int], least: float) -> bool:
-    """True if at least this share of each of the named blocks is visible."""
-    return set(orders) <= set(orders_of(seen_blocks(picture, least)))
+def are_seen(picture: QuestionPicture, least: float, orders: Collection[int] | None = None) -> bool:
+    """True if at least this share of each of the named blocks, by default of all, is visible."""
+    wanted = orders_of(picture.blocks) if orders is None else orders
+    return set(wanted) <= set(orders_of(seen_blocks(picture, least)))
 
 
 def require_seen(
@@ -194,9 +198,8 @@ def require_shapes_seen(picture: QuestionPicture) -> Sequence[Block]:
     require_seen(picture, _SHAPED)
     if not all(shows_profile(block, picture.view_deg) for block in picture.blocks):
         raise UnfairError("some block is seen from a side that does not tell its shape")
-    areas = _extents(*_plain(picture))[0]
-    small = [order for order, area in sorted(areas.items()) if area < _SHAPED_AREA]
-    if small:
+    areas = sizes(picture).area
+    if small := [order for order, area in sorted(areas.items()) if area < _SHAPED_AREA]:
         raise UnfairError(f"blocks {small} cover less than {_SHAPED_AREA:.1%} of the picture")
     return picture.blocks
 
@@ -206,7 +209,7 @@ def outermost(blocks: Sequence[Block], picture: QuestionPicture, to_left: bool) 
 
     Both its middle and its outer edge have to be clearly farther out than those of the others.
     """
-    spans, sign = _extents(*_plain(picture))[1], -1.0 if to_left else 1.0
+    spans, sign = sizes(picture).ends, -1.0 if to_left else 1.0
     ends = {b.order: [sign * end for end in spans[b.order]] for b in blocks}
     first, *others = sorted(blocks, key=lambda block: -sum(ends[block.order]))
     middle, edge = sum(ends[first.order]) / 2, max(ends[first.order])
@@ -236,23 +239,6 @@ def are_told_apart(pictures: Sequence[QuestionPicture]) -> bool:
     )
 
 
-def same_blocks(one: Sequence[Block], other: Sequence[Block]) -> bool:
-    """True if two sets of blocks look the same, up to 2 mm and 2 degrees; orders do not matter."""
-
-    def alike(a: Block, b: Block) -> bool:
-        start, end = Pose.goal(a), Pose.goal(b)
-        is_turned = a.look != b.look and end.angle_deg(start) > _SAME_DEG
-        return a.kind == b.kind and end.distance_m(start) <= _SAME_M and not is_turned
-
-    left = list(other)
-    for block in one:
-        match = next((b for b in left if alike(block, b)), None)
-        if match is None:
-            return False
-        left.remove(match)
-    return not left
-
-
 def picture_of(question: Question, label: str) -> QuestionPicture:
     """Return the picture with a label. Raises UnfairError unless there is exactly one."""
     found = [picture for picture in question.pictures if picture.label == label]
@@ -266,13 +252,16 @@ def option_pictures(question: Question) -> list[QuestionPicture]:
     return [picture_of(question, letter) for letter in LETTERS]
 
 
-def marked_order(picture: QuestionPicture, letter: str) -> int:
-    """Return the order of the block visible at a mark. Raises UnfairError if there is none."""
+def marked(picture: QuestionPicture, letter: str) -> tuple[tuple[float, float, float], int]:
+    """Return a mark's place [m], and the order of the block that is visible there.
+
+    Raises UnfairError if there is none.
+    """
     shot = seen(replace(picture, marks=()))
     for mark in picture.marks:
         order = seen_order(picture, shot, mark.position_m)
         if mark.letter == letter and order is not None:
-            return order
+            return mark.position_m, order
     raise UnfairError(f"no block is marked {letter}")
 
 
@@ -285,22 +274,23 @@ def with_lot(
 
 
 def highlighted(
-    picture: QuestionPicture, blocks: Sequence[Block], slots: Slots, taken: int | None = None
+    picture: QuestionPicture, blocks: Collection[Block], slots: Slots, taken: int | None = None
 ) -> frozenset[int]:
     """Return orders of the blocks in the slots' `color`; all others are in their `other` color.
 
     The block that is `taken` has its own color. Raises UnfairError if a picture shows another
     structure or other colors.
     """
-    color_of = {block.order: block.color for block in picture.blocks}
-    if taken is not None and color_of.pop(taken, "") != slots["taken"]:
-        raise UnfairError(f"picture {picture.label} does not show what is taken away")
-    if not {slots["color"], slots["other"]}.issuperset(color_of.values()):
-        raise UnfairError(f"picture {picture.label} shows other colors than the text names")
-    mine, given = ({b.order: replace(b, color="red") for b in s} for s in (picture.blocks, blocks))
-    if mine != given:
-        raise UnfairError(f"picture {picture.label} does not show the whole structure")
-    return frozenset(order for order, color in color_of.items() if color == slots["color"])
+    color_of = {block.order: block.color for block in picture.blocks if block.order != taken}
+    lot = frozenset(order for order, color in color_of.items() if color == slots["color"])
+    colors: dict[int, Color] = {}
+    for block in blocks:
+        role = "taken" if block.order == taken else "color" if block.order in lot else "other"
+        colors[block.order] = slots[role]  # type: ignore[assignment]
+    if set(colored([*blocks], colors)) != set(picture.blocks):
+        message = "does not show the whole structure in the colors of the text"
+        raise UnfairError(f"picture {picture.label} {message}")
+    return lot
 
 
 # Words that fit exactly one block
@@ -391,6 +381,12 @@ def resolve_seen(
     blocks = [resolve_one(text, picture) for text in texts]
     require_seen(picture, least, blocks)
     return blocks
+
+
+def named(asked: Draft, least: float = NAMED) -> list[Block]:
+    """Return the blocks in the slots `block` and `other`, as `resolve_seen`."""
+    texts = [asked.slots[name] for name in ("block", "other") if name in asked.slots]
+    return resolve_seen(texts, asked.picture, least)
 
 
 def names(block: Block, picture: QuestionPicture, features: Sequence[Feature]) -> tuple[str, ...]:

@@ -63,12 +63,10 @@ class ViewpointMaker(Maker):
             if shown.view_deg[0] not in _FRONTS_DEG:
                 raise UnfairError("the first picture is not straight from the front")
             azimuth = _from_side(shown.view_deg, slots["side_words"])[0]
-            return base.only_index(
-                [
-                    one.view_deg[0] % 360 == azimuth and sight.same_blocks(shown.blocks, one.blocks)
-                    for one in options
-                ]
-            )
+            mine, *looks = ({(b.look, b.position_m) for b in p.blocks} for p in (shown, *options))
+            sides = [option.view_deg[0] % 360 for option in options]
+            pairs = zip(sides, looks, strict=True)
+            return base.only_index([side == azimuth and look == mine for side, look in pairs])
         form = turned_form(shown.blocks)
         return base.only_index([turned_form(option.blocks) == form for option in options])
 
@@ -85,7 +83,7 @@ def _colorings(
     plain = [QuestionPicture("scene", red, view) for view in (first, second)]
     pixels = [shown_pixels(picture, seen(picture)) for picture in plain]
     for _ in range(_FAMILIES_TRIED):
-        scene = sight.recolored(scene, rng)
+        scene = replace(scene, blocks=sight.recolored(scene, first, rng).blocks)
         four = [scene.blocks, *(_exchanged(scene.blocks, rng) for _ in LETTERS[1:])]
         if _hits(four, *pixels) != 1 or min(_unlike(four, one) for one in pixels) < _LEAST_SHARE:
             continue
@@ -95,7 +93,7 @@ def _colorings(
             right = int(rng.integers(len(four)))
             dealt = [options[right], *options[:right], *options[right + 1 :]]
             slots = {"side_words": side} if side else {}
-            yield Draft(scene, stem, tuple(dealt), (shown[right],), slots)
+            yield Draft(stem, scene, (shown[right],), slots, dealt)
             return
 
 
@@ -159,7 +157,7 @@ class OrderingMaker(Maker):
         ]
         for view in views:
             plain = QuestionPicture("scene", scene.blocks, view, framed=scene.blocks)
-            if not sight.are_seen(plain, sight.orders_of(scene.blocks), sight.COUNTED):
+            if not sight.are_seen(plain, sight.COUNTED):
                 continue
             for _ in range(_CUTS_TRIED):
                 stages = _cut(scene, rng)
@@ -171,7 +169,7 @@ class OrderingMaker(Maker):
                     ordered = options if kind == "or-build" else options[::-1]
                     slots: dict[str, str] = {"color": pair[0], "other": pair[1]}
                     facts = {"stages": [sorted(stage) for stage in stages]}
-                    yield Draft(scene, kind, tuple(ordered), (), slots, facts)
+                    yield Draft(kind, scene, (), slots, ordered, facts=facts)
                     break
 
     def rederive(self, question: Question) -> tuple[int, ...]:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 from pydantic import Field, TypeAdapter
 
@@ -62,8 +62,7 @@ class GivenScene(Line, extra="forbid"):
     format: Format = 1
 
 
-@dataclass(frozen=True)
-class ReadScene:
+class ReadScene(NamedTuple):
     """A scene that was read, with its name and its place in a file."""
 
     name: str
@@ -73,50 +72,47 @@ class ReadScene:
 
 @dataclass(frozen=True)
 class Completed:
-    """A scene with all that was derived; `offered` are the candidates if they were given, and
-    `notes` describe anything unusual about it.
+    """A scene with all that was derived, or its problems.
+
+    `offered` are the candidates if they were given, and `notes` describe anything unusual.
     """
 
-    scene: Scene
-    offered: CandidateSet | None
-    notes: tuple[str, ...]
-
-
-def completed(read: ReadScene) -> Completed | tuple[Problem, ...]:
-    """Return a scene as `complete` does, or its problems."""
-    try:
-        return complete(read)
-    except DataError as error:
-        return tuple(error.problems)
+    scene: Scene | None = None
+    offered: CandidateSet | None = None
+    notes: tuple[str, ...] = ()
+    problems: tuple[Problem, ...] = ()
 
 
 def complete(read: ReadScene) -> Completed:
     """Derive a scene, and check that it can be built and stands.
 
-    Raises DataError with its problems: blocks that overlap, float or fall, contacts that allow no
-    order, candidates that lack a needed look.
+    Problems are blocks that overlap, float or fall, contacts that allow no order, and candidates
+    that lack a needed look.
     """
-    given = read.given
-    scene = derived(read.name, given, read.where)
+    name, given, where = read
+    try:
+        scene = derived(name, given, where)
+    except DataError as error:
+        return Completed(problems=tuple(error.problems))
     offered = None if given.candidates is None else candidate_set(given.candidates)
     facts = SceneFacts(scene, offered)
     # Blocks that overlap or float fall as well: only the cause is reported.
     found = [*findings_of(facts, ("overlap", "floating", "order", "candidates"))]
     found = found or [*findings_of(facts, ("unstable step", "unstable"))]
-    hint = "order blocks so that each can be placed, and stands, after those before it"
-    if found:
-        raise DataError(
-            replace(
-                one,
-                where=read.where,
-                message=f"scene {read.name}: {one.message}",
-                hint=hint if one.check in ("order", "unstable step") else "",
-            )
-            for one in found
-        )
-    noted = findings_of(facts, ("size", "hidden"))
+    reorder = "order blocks so that each can be placed, and stands, after those before it"
+    hints = {"order": reorder, "unstable step": reorder}
+    noted = () if found else findings_of(facts, ("size", "hidden"))
     notes = (", ".join(filter(None, (one.message, one.found, one.allowed))) for one in noted)
-    return Completed(scene, offered, tuple(notes))
+    problems = (
+        replace(
+            one,
+            where=where,
+            message=f"scene {name}: {one.message}",
+            hint=hints.get(one.check, ""),
+        )
+        for one in found
+    )
+    return Completed(scene, offered, tuple(notes), tuple(problems))
 
 
 def derived(name: str, given: GivenScene, where: str) -> Scene:

@@ -11,8 +11,10 @@ import itertools
 import math
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence, Set
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import islice
 from pathlib import Path
 from typing import Literal, NamedTuple
 
@@ -123,17 +125,16 @@ def _drawn_base(request: Request) -> Scene | None:
 
 def _fitting(name: str, group: str, blocks: list[Block]) -> Scene | None:
     """Return the scene of blocks if it is within the limits of a group, or None."""
-    levels = tuple(GROUPS[group].levels)
+    levels, least = tuple(GROUPS[group].levels), GROUPS[group].least
     limits = [LEVEL_LIMITS[level] for level in levels]
-    if not GROUPS[group].least <= len(blocks) <= min(limit.most_blocks for limit in limits):
+    if not least <= len(blocks) <= min(limit.most_blocks for limit in limits):
         return None
-    try:
+    with suppress(CycleError):
         scene = make_scene(name, levels, blocks)
-    except CycleError:
-        return None
-    if max(scene.graph.layers) > min(limit.most_layers for limit in limits):
-        return None
-    return scene if len({block.look for block in scene.blocks}) <= _MAX_LOOKS else None
+        is_low = max(scene.graph.layers) <= min(limit.most_layers for limit in limits)
+        if is_low and len({block.look for block in scene.blocks}) <= _MAX_LOOKS:
+            return scene
+    return None
 
 
 _PATIENCE = 150
@@ -202,11 +203,7 @@ class Production:
     """
 
     def __init__(
-        self,
-        seed: int,
-        palette: Palette,
-        workers: Workers,
-        excluded: Set[bytes] = frozenset(),
+        self, seed: int, palette: Palette, workers: Workers, excluded: Set[bytes] = frozenset()
     ) -> None:
         self._seed, self._palette, self._workers = seed, palette, workers
         self._excluded, self.rejected = excluded, 0
@@ -214,54 +211,58 @@ class Production:
         self._bases: dict[Request, str] = {}
         self._next: Counter[str] = Counter()
         self._named: Counter[int] = Counter()
-        self._width = 3
 
     def scenes(self, wanted: Sequence[Share]) -> Iterator[Scene]:
-        """Yield accepted scenes: first all base scenes, group by group, then the variations.
+        """Yield accepted scenes: first all base scenes, group by group, then the variations, with
+        further base scenes for those missing if there are too few to vary.
 
         Raises DataError if the rules give no more different scenes.
         """
-        self._width = max(3, len(str(sum(share.base + share.varied for share in wanted))))
-        for share in wanted:
-            yield from self.bases(share.group, share.base)
-        for share in wanted:
-            yield from self.variations(share.group, share.varied)
+        width = max(3, len(str(sum(share.base + share.varied for share in wanted))))
 
-    def bases(self, group: str, wanted: int) -> Iterator[Scene]:
-        """Yield scenes that the grammar draws."""
-        taken = 0
-        request = partial(Request, self._seed, self._palette, group)
-        for made, scene in self._accepted(wanted, request, self._next[group]):
-            taken, self._next[group] = taken + 1, made.number + 1
-            name = self._name(scene)
-            self._bases[made] = name
-            yield replace(scene, id=name, parents=(name,))
-        if taken < wanted:
-            message = f"gave no more than {taken} new scenes of {wanted}"
-            hint = "ask for fewer scenes, for other levels, or for --palette full"
-            raise DataError(Problem(f"level {group}", message, hint=hint))
+        def named(scene: Scene) -> Scene:
+            level = scene.levels[0]
+            self._named[level] += 1
+            return replace(scene, id=f"l{level}-{self._named[level]:0{width}d}-{scene.id}")
 
-    def variations(self, group: str, wanted: int) -> Iterator[Scene]:
-        """Yield variations, then base scenes for those missing if there are too few to vary."""
+        def bases(group: str, count: int) -> Iterator[Scene]:
+            taken, request = 0, partial(Request, self._seed, self._palette, group)
+            for made, drawn in self._accepted(count, request, self._next[group]):
+                taken, self._next[group], scene = taken + 1, made.number + 1, named(drawn)
+                self._bases[made] = scene.id
+                yield replace(scene, parents=(scene.id,))
+            if taken < count:
+                message = f"gave no more than {taken} new scenes of {count}"
+                hint = "ask for fewer scenes, for other levels, or for --palette full"
+                raise DataError(Problem(f"level {group}", message, hint=hint))
+
+        for share in wanted:
+            yield from bases(share.group, share.base)
+        for share in wanted:
+            taken = 0
+            for made, scene in self._varied(share):
+                taken += 1
+                parents = tuple(dict.fromkeys(self._bases[parent] for parent in made.parents))
+                yield replace(named(scene), parents=parents)
+            yield from bases(share.group, share.varied - taken)
+
+    def _varied(self, share: Share) -> Iterator[tuple[Request, Scene]]:
+        """Yield variations of a group, as `_accepted`; none if there are too few base scenes."""
         sources = []
-        for count, groups in GROUPS[group].sources:
+        for count, groups in GROUPS[share.group].sources:
             bases = [base for one in groups for base in self._bases if base.group == one]
             if len(bases) >= count:
                 sources.append((count, bases))
 
         def request(number: int) -> Request:
-            rng = np.random.default_rng(list(f"{self._seed}/{group}/parents/{number}".encode()))
+            text = f"{self._seed}/{share.group}/parents/{number}"
+            rng = np.random.default_rng(list(text.encode()))
             count, bases = sources[int(rng.integers(len(sources)))]
             chosen = rng.choice(len(bases), size=count, replace=False)
             parents = tuple(bases[int(i)] for i in chosen)
-            return Request(self._seed, self._palette, group, number, parents)
+            return Request(self._seed, self._palette, share.group, number, parents)
 
-        taken = 0
-        for made, scene in self._accepted(wanted, request, 0) if sources else ():
-            taken += 1
-            names = tuple(dict.fromkeys(self._bases[parent] for parent in made.parents))
-            yield replace(scene, id=self._name(scene), parents=names)
-        yield from self.bases(group, wanted - taken)
+        yield from self._accepted(share.varied, request, 0) if sources else ()
 
     def _accepted(
         self, wanted: int, request: Callable[[int], Request], first: int
@@ -281,17 +282,10 @@ class Production:
                     self._seen.add(one.form)
                     fresh.append(one)
             sound = self._workers.map(is_sound, [one.scene for one in fresh])
-            for one, is_kept in zip(fresh, sound, strict=True):
-                if is_kept:
-                    taken, last = taken + 1, one.request.number
-                    yield one.request, one.scene
-                    if taken == wanted:
-                        return
-
-    def _name(self, scene: Scene) -> str:
-        level = scene.levels[0]
-        self._named[level] += 1
-        return f"l{level}-{self._named[level]:0{self._width}d}-{scene.id}"
+            kept = (one for one, is_kept in zip(fresh, sound, strict=True) if is_kept)
+            for one in islice(kept, wanted - taken):
+                taken, last = taken + 1, one.request.number
+                yield one.request, one.scene
 
 
 Split = Literal["train", "dev"]
@@ -321,35 +315,31 @@ def split_tasks(
     parts = [(share, part) for share in shares(10_000, levels) for part in (0, 1)]
     weights = np.array([(share.base, share.varied)[part] for share, part in parts])
     for number in itertools.count(first, step):
-        rng = np.random.default_rng(
-            int.from_bytes(drawn_bytes(f"{split}/{seed}/{number}")[:16], "big")
-        )
+        text = f"{split}/{seed}/{number}"
+        rng = np.random.default_rng(int.from_bytes(drawn_bytes(text)[:16], "big"))
 
         def base(group: str, rng: np.random.Generator = rng) -> Request:
             return Request(int(rng.integers(2**62)), palette, group, int(rng.integers(2**31)))
 
         for _ in range(_LONGEST_SEARCH):
             share, is_varied = parts[int(rng.choice(len(parts), p=weights / weights.sum()))]
-            made = base(share.group)
-            parents: list[Drawn] = []
+            made, sources = base(share.group), list[Request]()
             if is_varied:
                 found = GROUPS[share.group].sources
                 count, groups = found[int(rng.integers(len(found)))]
                 sources = [base(groups[int(rng.integers(len(groups)))]) for _ in range(count)]
-                parents = [one for one in map(_drawn, sources) if one is not None]
-                if len(parents) < count:
-                    continue
-                made = replace(made, parents=tuple(sources))
-            one = _drawn(made)
-            drawn = (*parents, *([one] if one else ()))
-            is_fit = not any(
+            parents = [one for one in map(_drawn, sources) if one is not None]
+            if len(parents) < len(sources):
+                continue
+            one = _drawn(replace(made, parents=tuple(sources)))
+            if one is None or any(
                 each.colorless in barred or (each.colorless[0] < _DEV_BELOW) != (split == "dev")
-                for each in drawn
-            )
-            if one is not None and is_fit and is_acceptable(one.scene, PALETTES[palette]):
-                names = tuple(dict.fromkeys(f"{p.scene.id}-{p.form.hex()[:12]}" for p in parents))
-                name = f"{one.scene.id}-{one.form.hex()[:12]}"
-                scene = replace(one.scene, id=name, parents=names or (name,))
+                for each in (*parents, one)
+            ):
+                continue
+            if is_acceptable(one.scene, PALETTES[palette]):
+                name, *names = (f"{p.scene.id}-{p.form.hex()[:12]}" for p in (one, *parents))
+                scene = replace(one.scene, id=name, parents=tuple(dict.fromkeys(names or [name])))
                 yield AssemblyTask(scene, make_candidates(scene, palette=PALETTES[palette]))
                 break
         else:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import copy
 import functools
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
@@ -21,8 +21,14 @@ from phyblock.domain.blocks import BLOCK_TYPES, COLORS, KIT_PALETTE, SHAPES, Blo
 from phyblock.domain.scene import AOVGraph, Block, Scene
 from phyblock.domain.symmetry import Symmetry, fingerprint, image_deg, image_m, pose_class
 from phyblock.files import read_own_yaml
-from phyblock.sim.contact import GROUND, drop_height_m, support_graph, whole_bounds_m
-from phyblock.sim.geometry import corners_m
+from phyblock.sim.contact import (
+    GROUND,
+    at,
+    bounds_m,
+    drop_height_m,
+    support_graph,
+    whole_bounds_m,
+)
 
 POSES: Mapping[BlockType, Mapping[str, Euler]] = {
     block_type: shape.poses for block_type, shape in SHAPES.items()
@@ -60,7 +66,22 @@ def _turned(block_type: BlockType, euler_deg: Euler, symmetry: Symmetry) -> Eule
 
 UNIT_M = 0.025
 """Grid unit [m]: half the side of a cube."""
-_ABOVE_M = 1.0
+_LIFT_M = 1.0
+
+
+def lowered(block: Block, onto: Sequence[Block], x_m: float, y_m: float) -> Block:
+    """Return the block lowered in its orientation, the middle of its outline over (x, y) [m].
+
+    It stops where it first touches one of the blocks, or the floor.
+    """
+    middle = bounds_m(block).mean(axis=0)
+    x, y = (
+        float(round(start + to - float(half), 6)) + 0.0
+        for start, to, half in zip(block.position_m, (x_m, y_m), middle, strict=False)
+    )
+    lifted = replace(block, position_m=(x, y, block.position_m[2] + _LIFT_M))
+    fall_m = drop_height_m(lifted, onto)
+    return replace(lifted, position_m=(x, y, round(lifted.position_m[2] - fall_m, 6) + 0.0))
 
 
 def make_scene(name: str, levels: tuple[int, ...], blocks: list[Block]) -> Scene:
@@ -84,14 +105,18 @@ def scene_of(
     longest path. Raises CycleError if contacts allow no order.
     """
     below = support_graph(blocks)
-    number = {block.order: index for index, block in enumerate(blocks)}
-    rests_on = [sorted(below[block.order] - {GROUND}) for block in blocks]
-    graph = AOVGraph(tuple(frozenset(number[order] for order in orders) for orders in rests_on))
     finished = tuple(
-        replace(block, depend=tuple(orders), layer=layer)
-        for block, orders, layer in zip(blocks, rests_on, graph.layers, strict=True)
+        replace(block, depend=tuple(sorted(below[block.order] - {GROUND})), layer=layer)
+        for block, layer in zip(blocks, graph_of(below).layers, strict=True)
     )
     return Scene(name, levels, finished, parents or (name,))
+
+
+def graph_of(below: Mapping[int, Collection[int]]) -> AOVGraph:
+    """Return the graph of blocks, by the orders that each rests on. Raises CycleError."""
+    number = {order: vertex for vertex, order in enumerate(below)}
+    held = (frozenset(number[o] for o in under if o != GROUND) for under in below.values())
+    return AOVGraph(tuple(held))
 
 
 Palette = Literal["kit", "full"]
@@ -150,16 +175,9 @@ class Draft:
         """
         poses = POSES[block_type]
         euler = poses[pose] if pose else next(iter(poses.values()))
-        corners = corners_m(block_type, (0.0, 0.0, 0.0), euler)
-        middle = (corners.min(axis=0) + corners.max(axis=0)) / 2
-        place = np.array([x, y]) * UNIT_M - middle[:2]
-        above = (float(place[0]), float(place[1]), _ABOVE_M)
-        order = len(self.blocks) + 1
         color = color or SHAPES[block_type].kit_colors[0]
-        block = Block(order, block_type, color, above, euler, (), 1)
-        fall_m = drop_height_m(block, self.blocks)
-        landed = tuple(round(c, 6) + 0.0 for c in (above[0], above[1], _ABOVE_M - fall_m))
-        self.blocks.append(replace(block, position_m=(landed[0], landed[1], landed[2])))
+        block = replace(at((block_type, euler)), order=len(self.blocks) + 1, color=color)
+        self.blocks.append(lowered(block, self.blocks, x * UNIT_M, y * UNIT_M))
 
     def build(self, text: str, tone: int = 0) -> None:
         """Lower blocks one after another, as in `2 cube 1; arch:cradle 0,-1; cube +1; top`.
