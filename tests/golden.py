@@ -44,7 +44,9 @@ SUITES: dict[str, dict[str, Any]] = {
     "plans-json": {"answer_format": "json_schema"},
     "plans-blind": {"full_planning": {"blind": True}},
     "plans-shuffled": {"candidates": {"order": "shuffled"}, "seeds": [0, 1]},
-    "plans-varied": {"vary": {"view": ["oblique", "front"], "layout": ["composite", "separate"]}},
+    "plans-varied": {
+        "vary": {"view": ["oblique", "front"], "layout": ["composite", "separate"], "repeats": 2}
+    },
     "steps": {"tracks": ["step_planning"]},
     "steps-json": {"tracks": ["step_planning"], "answer_format": "json_schema"},
     "poses": {"tracks": ["pose_planning"]},

@@ -21,7 +21,6 @@ from phyblock.files import (
     read_bytes,
     read_picture,
     write_named,
-    writing,
 )
 from tests.fuzz.strategies import PICTURES, chunk, encoded, png_header
 
@@ -41,15 +40,6 @@ def test_what_cannot_be_replaced_stays_and_nothing_is_left_beside_it(tmp_path):
     with pytest.raises(OSError, match="folder"):
         atomic_write(tmp_path / "folder", b"data")
     assert list(tmp_path.iterdir()) == [tmp_path / "folder"]
-
-
-def test_what_the_disk_refuses_is_one_of_our_errors(tmp_path):
-    long = tmp_path / ("x" * 300)
-    for path, said in ((long, "File name too long"), (tmp_path / "\ud800", "surrogates")):
-        with pytest.raises(StoreError, match=f"cannot be written: .*{said}"), writing(path):
-            path.write_text("text")
-    with pytest.raises(StoreError, match="no words"), writing(tmp_path):
-        raise OSError("no words")
 
 
 def test_a_named_file_replaces_one_of_its_kind_and_nothing_else(tmp_path):

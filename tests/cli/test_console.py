@@ -7,18 +7,15 @@ import pandas as pd
 from hypothesis import given
 from hypothesis import strategies as st
 from rich.cells import cell_len
-from rich.console import Console
 
 from phyblock.cli.console import make_console, print_table
 from phyblock.cli.progress import ProgressView
 from phyblock.models.model import ModelEvent
-from phyblock.records.files import known_records
 from phyblock.results.export import write_csv
 from phyblock.results.load import load_run
 from phyblock.results.tables import write_tables
 from phyblock.results.text import Column, TextTable
-from phyblock.run.runner import RunStarted, SampleDone
-from phyblock.run.store import Summary
+from phyblock.run.runner import RunStarted
 from tests.web.factory import LEVELS, manifest, record, score, write_run
 
 NAME = ":b: [red]x[/red]\n=2 \x1b[31m\u202e|&\r"
@@ -97,42 +94,3 @@ def test_no_cell_of_any_csv_is_a_formula(tmp_path):
                         float(cell)
     assert checked > len(LEVELS)
     assert pd.read_csv(exported[0])["reply"][0] == "'-2+3+cmd|' /C calc'!A0"
-
-
-def retry(wait_s=1.0):
-    return ModelEvent("alpha", "retry", "HTTP 429: busy", wait_s)
-
-
-def failed():
-    line = known_records().validate_python(record(model="alpha", outcome="api_error"))
-    return SampleDone(Summary.of(line))
-
-
-def logged(*events):
-    """The lines that a log gets, each event at its time [s]."""
-    now_s = 0.0
-    screen = io.StringIO()
-    with ProgressView(Console(file=screen, width=160), lambda: now_s) as view:
-        view(RunStarted(10, {"alpha": ()}))
-        for at_s, event in events:
-            now_s = at_s
-            view(event)
-    return screen.getvalue().splitlines()
-
-
-def test_a_log_tells_of_retries_servers_failures_and_models_that_are_stopped():
-    lines = logged(
-        (0.0, retry()),
-        (1.0, ModelEvent("", "notice", "http://host:1 cannot be reached [x] :b: no connection")),
-        (2.0, retry(9.0)),
-        (11.0, failed()),
-        (12.0, ModelEvent("alpha", "stopped", "HTTP 401: no")),
-        (21.5, retry()),
-    )
-    assert lines == [
-        "alpha: HTTP 429: busy; waiting 1 s; more are counted as sent again",
-        "http://host:1 cannot be reached [x] :b: no connection",
-        "1 of 10 samples after 11 s, 1 api error, 2 sent again",
-        "alpha stopped: HTTP 401: no",
-        "1 of 1 sample after 22 s, 1 api error, 3 sent again",
-    ]

@@ -61,13 +61,6 @@ def suite(workspace, monkeypatch):
     return workspace
 
 
-def test_a_pipe_gets_whole_tables_without_escapes(suite):
-    done = suite.completed()
-    assert "\x1b" not in done.out
-    assert [row.split()[0] for row in done.out.splitlines() if "[" in row] == ["oracle", "random"]
-    assert done.out.splitlines()[-1] == "out/tables"
-
-
 def test_a_terminal_shows_bars_and_then_the_tables(suite):
     class Bracketing(OpenAIChat):
         """A model whose messages look like markup."""

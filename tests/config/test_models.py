@@ -10,7 +10,6 @@ from hypothesis import strategies as st
 from phyblock.config.models import (
     ModelConfig,
     SamplingSpec,
-    Tariff,
     host_of,
     is_address,
     load_models,
@@ -46,17 +45,12 @@ old: {replay: replies/old, published: GPT-4o}
 m:
   id: hosted_vllm/Qwen/Qwen2.5-VL-7B-Instruct
   api_base: [http://h:1/v1, http://h:2/v1]
-  extra_body: {top_k: 1, chat_template_kwargs: {enable_thinking: false}}
-  price: {input: 0, output: 1.5}
 """
     models = load(tmp_path, text)
     assert list(models) == ["gpt-4o", "on", "1e-3", "old", "m"]
     assert models["gpt-4o"] == ModelConfig(name="gpt-4o", id="openai/gpt-4o-2024-08-06")
     assert models["old"].recording == tmp_path / "replies" / "old"
-    assert [model.kind for model in models.values()] == ["litellm"] * 3 + ["replay", "litellm"]
     assert models["m"].addresses == ("http://h:1/v1", "http://h:2/v1")
-    assert models["m"].api_base is None
-    assert models["m"].price == Tariff(input=0, output=1.5)
     assert load(tmp_path, "# none yet\n") == {}
     for name in ("openai/task-abc-def", "azure/risk-big", "a/disk-12345678"):  # are no keys
         assert load(tmp_path, f"m: {name}\n")["m"].id == name

@@ -107,21 +107,6 @@ async def test_requests_and_tokens_of_a_minute_keep_to_their_limits(arrivals, rp
             assert taken * 60 <= lasted_s * tpm
 
 
-def test_tokens_count_as_reserved_until_a_reply_reports_them():
-    waits = []
-
-    async def sleep(seconds):
-        waits.append(seconds)
-
-    policy = RetryPolicy(clock=Clock(lambda: sum(waits), sleep))
-    with Running(ROUTES["direct"].server()) as running:
-        config = ROUTES["direct"].config(running.url, tpm=6_000, max_concurrency=1)
-        requests = map(make_request, ("000", "001", "002"))
-        used = [reply.usage for reply in ask(make_model(config, policy=policy), *requests)][:2]
-    taken = sum(usage.prompt_tokens + usage.completion_tokens for usage in used)
-    assert sum(waits) == pytest.approx(taken * 60 / 6_000)
-
-
 @in_a_loop
 async def test_a_model_waiting_for_its_minute_holds_no_place_that_another_could_use():
     time = FakeTime()

@@ -32,14 +32,6 @@ def answer(model, key, seed=0):
     return asyncio.run(model.ask(replace(make_request(key, seed), track="full_planning")))
 
 
-def test_a_reply_is_found_by_key_whatever_the_seed(tmp_path):
-    (tmp_path / "007.json").write_text(json.dumps({"predict": STEPS}))
-    model = replay(tmp_path)
-    assert not model.needs_messages
-    replies = [answer(model, "007", seed) for seed in (0, 1)]
-    assert replies == [Reply(text=STEPS, finish="unknown", cost_usd=0.0, attempts=0)] * 2
-
-
 @pytest.mark.parametrize(
     ("content", "said"),
     [

@@ -1,6 +1,5 @@
 """Laws of runs: what must not matter does not, what is stored is enough, one process a folder."""
 
-import json
 import random
 import shutil
 import time
@@ -121,17 +120,6 @@ def test_a_second_process_is_refused_and_the_first_goes_on(workspace):
         assert server.requests == 5
 
 
-def test_a_limit_keeps_some_of_every_level_and_is_a_run_of_its_own(copy):
-    copy.out = copy.root / "few"
-    copy.completed("--limit", "3", "--models", "oracle")
-    records = copy.records()
-    assert len({r["scene"] for r in records}) == 3
-    assert {level for r in records for level in r["levels"]} == {1, 2, 3, 4}
-    other = copy.run("--limit", "4", "--models", "oracle")
-    assert other.code == 2
-    assert "found: different: suite.limit (3, now 4)" in other.err
-
-
 def test_only_what_may_change_a_reply_makes_another_run(copy):
     labels = {"size_b": 7, "published": "GPT-4o", "price": {"input": 1.0, "output": 2.0}}
     copy.write_models("http://127.0.0.1:9", "alpha", transport="litellm", **labels)
@@ -219,17 +207,6 @@ def test_answers_to_two_versions_of_questions_are_not_mixed():
     runs = [run_of([], manifest(tracks={"vqa": {"questions": digest}})) for digest in "ab"]
     with pytest.raises(SpecError, match=r"tracks.vqa.questions: cannot be .*\n.*found: b"):
         check_pair(runs[1], runs[0], [], "vqa", Headline(runs[0], "vqa").measure)
-
-
-def test_a_record_is_one_line_of_json_whatever_the_reply_holds(workspace):
-    text = "Step1: Move block with index 1\n\u2028\x85\r\0\ud800 ￿ 😀"
-    with workspace.served(OpenAIChat(say=lambda _: text)) as server:
-        for _ in range(2):
-            workspace.completed()
-        assert server.requests == 5
-    lines = (workspace.out / "records.jsonl").read_bytes().split(b"\n")[:-1]
-    assert len(lines) == 5
-    assert all("😀" in json.loads(line)["reply"]["text"] for line in lines)
 
 
 def test_scores_can_be_made_where_the_data_set_has_moved(copy):

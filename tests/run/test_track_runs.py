@@ -3,7 +3,6 @@
 import hashlib
 import json
 import re
-import shutil
 from collections import Counter
 from dataclasses import replace
 
@@ -19,7 +18,7 @@ from phyblock.results.load import load_run
 from phyblock.run.rescore import rescore
 from phyblock.sim.engine import ENGINES, described_engine, installed_engines
 from tests.servers.chassis import Faults, Running
-from tests.servers.openai_chat import OpenAIChat, StepAgent, said, told_history
+from tests.servers.openai_chat import OpenAIChat, StepAgent
 from tests.sim.structures import counterweighted_beam
 from tests.tracks.conftest import raw_of
 from tests.workspace import call, questions, vqa_suite, write_questions
@@ -88,11 +87,7 @@ def test_all_tracks_ask_and_read_by_the_schema(inside):
     assert inside.records() == records
 
     # A recording is read in the form in which it was asked for.
-    lines = [json.dumps(r) for r in records if r["track"] == "full_planning"]
-    (inside.root / "recorded").mkdir()
-    shutil.copy(inside.out / "run.yaml", inside.root / "recorded")
-    (inside.root / "recorded" / "records.jsonl").write_text("\n".join(lines) + "\n")
-    inside.write_yaml("models.yaml", {"alpha": {"replay": "./recorded"}})
+    inside.write_yaml("models.yaml", {"alpha": {"replay": "./out"}})
     inside.write_suite(models=["alpha"])
     with pytest.raises(InputError, match="was made with answer_format: json_schema"):
         call("validate", "suite.yaml")
@@ -176,30 +171,6 @@ def stable(value):
 
 def by_sample(records):
     return {record["sample"]: stable(record) for record in records}
-
-
-def test_the_server_sees_goal_candidates_current_picture_and_history(workspace):
-    with prepare(workspace, StepAgent()) as server:
-        workspace.completed()
-    records = workspace.records()
-    assert sum(len(record["turns"]) for record in records) == len(server.seen)
-    answers = {one.sample: one for one in server.seen}
-    for record in records:
-        mine = [answers[turn["reply"]["reasoning"]] for turn in record["turns"]]
-        assert len({one.pictures[:2] for one in mine}) == 1
-        operations, world, current = [], [], {}
-        for one, turn in zip(mine, record["turns"], strict=True):
-            assert [isinstance(part, str) for part in one.parts] == [False] * 3 + [True]
-            labels = [image["label"] for image in turn["prompt"]["images"]]
-            assert labels == ["goal", "candidates", "current"]
-            assert [image["sha256"] for image in turn["prompt"]["images"]] == [*one.pictures]
-            assert told_history(one) == operations
-            assert current.setdefault(tuple(world), one.pictures[2]) == one.pictures[2]
-            assert turn["reply"]["text"] == said(one)
-            move = turn["parse"]["move"]
-            operations.append(f"Move({move})" if move else "(no operation)")
-            world = turn["world"]
-        assert len(set(current.values())) == len(current)
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,6 @@
 
 import hashlib
 import json
-import re
 from collections.abc import Callable
 from typing import Any
 
@@ -70,9 +69,6 @@ def _part(part: dict[str, Any]) -> str | tuple[str, str]:
     return picture_part(head.removeprefix("data:"), data)
 
 
-_HISTORY = re.compile(r"^\d+\. (?P<operation>.+?)(?:: .*)?$", re.MULTILINE)
-
-
 class StepAgent(OpenAIChat):
     """Answers `Next plan: Move(N)`, N by a digest of the messages; now and then not readably.
 
@@ -94,12 +90,6 @@ def said(seen: Seen) -> str:
     if digest[0] < 20:
         return "I would rather not say."
     return f"The base comes first.\nNext plan: Move({digest[1] % 5 + 1})"
-
-
-def told_history(seen: Seen) -> list[str]:
-    """The operations of the history as it stands in the text of a request."""
-    (text,) = [part for part in seen.parts if isinstance(part, str)]
-    return [match["operation"] for match in _HISTORY.finditer(text)]
 
 
 if __name__ == "__main__":
