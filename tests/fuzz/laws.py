@@ -24,7 +24,7 @@ from aiohttp import web
 from tests.fork_server import Done, run_forked
 from tests.servers.chassis import Seen
 from tests.servers.faults import WIRE_FAULTS
-from tests.servers.openai_chat import OpenAIChat, StepAgent
+from tests.servers.openai_chat import OpenAIChat, answered
 from tests.workspace import Workspace, shared_folders
 
 CODES = (0, 1, 2, 130)
@@ -264,32 +264,15 @@ def kept_in(folder: Path) -> set[tuple[str, str]]:
 
 
 class LedgerChat(OpenAIChat):
-    """Answers plans and questions; the digest of a request is its reply's reasoning.
+    """Answers every track; the digest of a request is its reply's reasoning.
 
     Several that serve the same model may share a `ledger`.
     """
 
-    def __init__(self, *args: Any, ledger: Ledger | None = None, **options: Any) -> None:
-        super().__init__(*args, **options)
+    def __init__(self, *args: Any, ledger: Ledger | None = None) -> None:
+        super().__init__(*args, say=answered, think=lambda seen: seen.sample)
         self.ledger = ledger or Ledger()
 
     async def _end(self, seen: Seen, ending: str, request: web.Request) -> web.StreamResponse:
         self.ledger.entries.append(Entry(seen.model, seen.sample, ending))
         return await super()._end(seen, ending, request)
-
-    def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
-        body = super().reply(seen, ending)
-        for choice in body["choices"]:
-            letter = "ABCD"[hashlib.sha256(seen.sample.encode()).digest()[0] % 4]
-            message = choice["message"]
-            message["reasoning_content"] = seen.sample
-            if "Question:" in str(seen.parts[-1]):
-                message["content"] = f"Answer: {letter}"
-        return body
-
-
-class LedgerAgent(LedgerChat, StepAgent):
-    """Answers the turns of episodes."""
-
-    def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
-        return StepAgent.reply(self, seen, ending)

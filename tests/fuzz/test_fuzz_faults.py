@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from phyblock.errors import RetryableError, SampleError
 from phyblock.models.costs import Budget
 from phyblock.records.record import Reply
-from tests.fuzz.laws import LedgerAgent, LedgerChat, watched
+from tests.fuzz.laws import LedgerChat, watched
 from tests.fuzz.strategies import FAULTS, SEED, fuzzed
 from tests.models.factory import (
     QUICK,
@@ -123,7 +123,7 @@ def test_faults(workspace, tallies, track, transport):
     n = 0
     while sum(met.values()) < _QUOTA:
         faults = Faults.spread(_PASSING, _SHARE, seed=1 + SEED + n, retry_after="0")
-        server = (LedgerAgent if track == "step_planning" else LedgerChat)(faults)
+        server = LedgerChat(faults)
         with Running(server) as running:
             workspace.out = workspace.root / f"out{n}"
             drawn = list(range(n * seeds, (n + 1) * seeds))

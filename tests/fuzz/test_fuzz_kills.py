@@ -13,7 +13,7 @@ from collections import Counter
 
 import pytest
 
-from tests.fuzz.laws import Ledger, LedgerAgent, LedgerChat, kept_in
+from tests.fuzz.laws import Ledger, LedgerChat, kept_in
 from tests.fuzz.strategies import KILLS, SEED
 from tests.run.test_track_runs import by_sample
 from tests.servers.chassis import FAULTS, Faults, Running
@@ -96,8 +96,7 @@ def test_kills(workspace, tallies, track, count, options):
     rounds = -(-KILLS // len(TRACKS))
     draw = random.Random(f"{SEED} {track} {count}")
     write_questions(workspace.root / "questions", questions(SCENES, 4, ("SH", "CO")))
-    kind, ledger = (LedgerAgent if track == "step_planning" else LedgerChat), Ledger()
-    names = () if count == 1 else FAULTS
+    ledger, names = Ledger(), () if count == 1 else FAULTS
     seeds = range(rounds * (1 if count == 1 else 4) * (_ASKED_PER_EVENT + AT_ONCE)
                   // asked_per_seed + 2)  # fmt: skip
     workspace.write_suite(
@@ -110,7 +109,7 @@ def test_kills(workspace, tallies, track, count, options):
         for n in range(count):
             fields = {"seed": 1 + SEED + n, "retry_after": "0", "latency_s": 0.03}
             faults = Faults.spread(names, 0.15, **fields)
-            servers.append(stack.enter_context(Running(kind(faults, ledger=ledger))))
+            servers.append(stack.enter_context(Running(LedgerChat(faults, ledger=ledger))))
         bases = [f"{server.url}/v1" for server in servers]
         for _ in range(rounds):
             # The order of the addresses may change.

@@ -12,12 +12,11 @@ from phyblock.run.plan import estimate, make_plan
 from tests.models.factory import ROUTES
 from tests.servers.billing import COMPLETION, PROVIDERS, BillingOpenAI, o200k_tokens, tile_tokens
 from tests.servers.chassis import Faults, Running
-from tests.servers.openai_chat import OpenAIChat, said
+from tests.servers.openai_chat import OpenAIChat, answered
 from tests.workspace import (
     CALL_USD,
     PRICE,
     TWICE,
-    questions,
     write_questions,
 )
 
@@ -88,19 +87,15 @@ def planned(workspace):
 
 def begin(workspace, stack):
     """Write a suite and its models, each behind a server that bills as its provider does."""
-    servers = {}
+    servers = {model_id.partition("/")[2]: make() for model_id, make in PROVIDERS.items()}
     entries = {}
-    for model_id, make in PROVIDERS.items():
-        provider, _, name = model_id.partition("/")
-        running = stack.enter_context(Running(servers.setdefault(name, make())))
-        entries[name] = {
-            "id": model_id,
-            "api_base": running.url + ROUTES.get(provider, ROUTES["openai"]).path,
-            "temperature": None,
-            "price": TARIFF,
-        }
+    for model_id, (name, server) in zip(PROVIDERS, servers.items(), strict=True):
+        path = ROUTES[model_id.partition("/")[0]].path
+        url = stack.enter_context(Running(server)).url + path
+        about = {"id": model_id, "api_base": url, "temperature": None, "price": TARIFF}
+        entries[name] = about
     workspace.write_yaml("models.yaml", entries)
-    write_questions(workspace.root / "questions", questions())
+    write_questions(workspace.root / "questions")
     workspace.write_suite(
         tracks=["full_planning", "vqa"],
         vqa={"path": "./questions"},
@@ -154,7 +149,7 @@ def test_texts_count_as_the_public_vocabulary_does(workspace, track):
 
 
 def test_episodes_are_billed_no_more_than_a_dry_run_expects(workspace):
-    server = BillingOpenAI(o200k_tokens, tile_tokens, 3, say=said)
+    server = BillingOpenAI(o200k_tokens, tile_tokens, 3, say=answered)
     with Running(server) as running:
         entry = {"id": "openai/gpt-4o-2024-08-06", "api_base": f"{running.url}/v1", "price": TARIFF}
         workspace.write_yaml("models.yaml", {"m": entry})

@@ -15,17 +15,17 @@ from phyblock.registry import known_tracks
 from phyblock.run import manifest, rescore, store
 from tests.run.test_track_runs import by_sample
 from tests.servers.chassis import Faults, Running
-from tests.servers.openai_chat import StepAgent
+from tests.servers.openai_chat import OpenAIChat, answered
 from tests.workspace import call
 
 EARLIER = 5
 
 
-class Stopping(StepAgent):
+class Stopping(OpenAIChat):
     """Takes no key any more once it has given so many answers; `answered` names their requests."""
 
     def __init__(self, answers):
-        super().__init__()
+        super().__init__(say=answered)
         self.answers = answers
         self.answered: list[str] = []
 

@@ -66,27 +66,21 @@ KEYS = {
 PNG_HEAD = base64.b64encode(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR")[:20]
 
 
-class Parrot(OpenAIChat):
-    """Says the key in whatever it says."""
-
-    def reply(self, seen, ending):
-        body = super().reply(seen, ending)
-        body["model"] = f"a model for {seen.key}"
-        for choice in body["choices"]:
-            choice["message"]["content"] += f"\nYour key is {seen.key}."
-            choice["message"]["reasoning_content"] = f"The key is {seen.key}."
-        return body
-
-    def error(self, status, ending, message):
-        return super().error(status, ending, f"{message} {self.seen[-1].key}")
+def told(seen):
+    """A plan, and the key."""
+    return f"{seen.reply_text}\nYour key is {seen.key}."
 
 
 @pytest.mark.parametrize("transport", ["direct", pytest.param("litellm", marks=pytest.mark.slow)])
 def test_keys_and_pictures_stay_off_the_disk(workspace, transport):
     echoes = {f"echo-key-{kind}": 0.04 for kind in ("in-reply", "json", "cut", "page")}
     faults = Faults({"429": 0.1, "500": 0.1, "html": 0.1, **echoes}, retry_after="0")
-    kinds = {"talks": faults, "locked": Faults(mode="echo-key"), "refuses": Faults(mode="400")}
-    servers = {name: Parrot(each) for name, each in kinds.items()}
+    kinds = {
+        "talks": faults,
+        "locked": Faults(mode="echo-key"),
+        "refuses": Faults(mode="echo-key-json"),
+    }
+    servers = {name: OpenAIChat(each, say=told, think=told) for name, each in kinds.items()}
     with (
         Running(servers["talks"]) as talks,
         Running(servers["locked"]) as locked,
@@ -107,8 +101,8 @@ def test_keys_and_pictures_stay_off_the_disk(workspace, transport):
         # What fails for good is recorded with what the server said, and waits grow no longer.
         limits = {"max_attempts": 3, "retry_for_s": 0}
         workspace.write_suite(models=list(entries), seeds=[0, 1], limits=limits)
-        told = [workspace.run("--yes", env=KEYS, fresh=True), workspace.run("--dry-run", env=KEYS)]
-        told.append(workspace.phyblock("models", env=KEYS))
+        shown = [workspace.run("--yes", env=KEYS, fresh=True), workspace.run("--dry-run", env=KEYS)]
+        shown.append(workspace.phyblock("models", env=KEYS))
     used = {seen.key for server in servers.values() for seen in server.seen}
     names = ("HOSTED_VLLM_API_KEY", "MY_SERVER_KEY", "MY_SHORT_KEY", "OPENAI_API_KEY")
     assert used == {KEYS[name] for name in names}
@@ -116,7 +110,7 @@ def test_keys_and_pictures_stay_off_the_disk(workspace, transport):
 
     found = workspace.files()
     assert any(name.endswith("replies.sqlite") for name in found)
-    found |= {f"output {i}": (done.out + done.err).encode() for i, done in enumerate(told)}
+    found |= {f"output {i}": (done.out + done.err).encode() for i, done in enumerate(shown)}
     for name, content in found.items():
         assert b"5ecret" not in content, name
         assert PNG_HEAD not in content, name

@@ -18,7 +18,7 @@ from phyblock.results.load import load_run
 from phyblock.run.rescore import rescore
 from phyblock.sim.engine import ENGINES, described_engine, installed_engines
 from tests.servers.chassis import Faults, Running
-from tests.servers.openai_chat import OpenAIChat, StepAgent
+from tests.servers.openai_chat import OpenAIChat, answered
 from tests.sim.structures import counterweighted_beam
 from tests.tracks.conftest import raw_of
 from tests.workspace import call, questions, vqa_suite, write_questions
@@ -174,17 +174,13 @@ def by_sample(records):
 
 
 @pytest.mark.parametrize(
-    ("kind", "fields"),
-    [
-        (OpenAIChat, {"tracks": ["full_planning"], "seeds": list(range(40))}),
-        (StepAgent, {"limit": 3}),
-    ],
+    "fields", [{"tracks": ["full_planning"], "seeds": list(range(40))}, {"limit": 3}]
 )
-def test_faults_change_nothing_and_every_request_is_an_attempt(workspace, kind, fields):
+def test_faults_change_nothing_and_every_request_is_an_attempt(workspace, fields):
     found = []
     mix = {"429": 0.1, "500": 0.05, "reset": 0.02, "cut": 0.005, "empty": 0.005}
     for faults in (Faults(), Faults(mix, retry_after="0")):
-        with prepare(workspace, kind(faults), **fields) as server:
+        with prepare(workspace, OpenAIChat(faults, say=answered), **fields) as server:
             workspace.out = workspace.root / f"out{len(found)}"
             workspace.completed("--no-cache")
         records = workspace.records()
@@ -234,6 +230,6 @@ def test_runs_in_two_engines_are_scored_anywhere_and_never_compared(inside, monk
 
 @pytest.mark.parametrize(("mode", "outcome"), [("length", "truncated"), ("filtered", "refusal")])
 def test_an_episode_of_which_no_reply_is_whole_is_no_parse_failure(workspace, mode, outcome):
-    with prepare(workspace, StepAgent(Faults(mode=mode)), limit=3):
+    with prepare(workspace, OpenAIChat(Faults(mode=mode)), limit=3):
         workspace.completed()
     assert {record["outcome"] for record in workspace.records()} == {outcome}

@@ -14,18 +14,21 @@ _CODES = {"policy": "content_policy_violation", "quota": "insufficient_quota"}
 
 
 class OpenAIChat(LocalServer):
-    """POST /v1/chat/completions; a reply says what `say` gives, and `usage` is told of each."""
+    """POST /v1/chat/completions; a reply says what `say` gives and reasons what `think` gives, and
+    `usage` is told of each.
+    """
 
     def __init__(
         self,
         faults: Faults | None = None,
         *,
         say: Callable[[Seen], str] = lambda seen: seen.reply_text,
+        think: Callable[[Seen], str] = lambda _: "Let me see.",
         usage: object = USAGE,
         **options: Any,
     ) -> None:
         super().__init__(faults, **options)
-        self.say, self.usage = say, usage
+        self.say, self.think, self.usage = say, think, usage
 
     def add_routes(self, app: web.Application) -> None:
         app.router.add_post("/v1/chat/completions", self.handle)
@@ -45,7 +48,7 @@ class OpenAIChat(LocalServer):
     def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
         finish = {"length": "length", "filtered": "content_filter"}.get(ending, "stop")
         text = "" if ending in ("length", "filtered", "blank") else self.say(seen)
-        message = {"role": "assistant", "content": text, "reasoning_content": "Let me see."}
+        message = {"role": "assistant", "content": text, "reasoning_content": self.think(seen)}
         choice = {"index": 0, "message": message, "finish_reason": finish}
         return {
             "id": f"chatcmpl-{seen.sample}",
@@ -69,24 +72,16 @@ def _part(part: dict[str, Any]) -> str | tuple[str, str]:
     return picture_part(head.removeprefix("data:"), data)
 
 
-class StepAgent(OpenAIChat):
-    """Answers `Next plan: Move(N)`, N by a digest of the messages; now and then not readably.
-
-    The digest of a request stands in the reply's reasoning, so that it is found again on disk.
+def answered(seen: Seen) -> str:
+    """Return what the track asks for, by a digest of the messages: a letter, a move (now and then
+    one that cannot be read), or a plan.
     """
-
-    def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
-        body = super().reply(seen, ending)
-        if ending == "ok":
-            message = body["choices"][0]["message"]
-            message["content"] = said(seen)
-            message["reasoning_content"] = seen.sample
-        return body
-
-
-def said(seen: Seen) -> str:
-    """Return the agent's answer."""
+    asked = str(seen.parts[-1])
     digest = hashlib.sha256(json.dumps([seen.system, seen.parts]).encode()).digest()
+    if "Question:" in asked:
+        return f"Answer: {'ABCD'[digest[0] % 4]}"
+    if "Next plan:" not in asked:
+        return seen.reply_text
     if digest[0] < 20:
         return "I would rather not say."
     return f"The base comes first.\nNext plan: Move({digest[1] % 5 + 1})"
