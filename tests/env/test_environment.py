@@ -13,7 +13,6 @@ from PIL import Image
 
 import phyblock
 import phyblock.env
-from phyblock.data.lookup import read_data_set
 from phyblock.domain.blocks import BLOCK_TYPES, COLORS
 from phyblock.domain.scene import CandidateSet, PoseStep
 from phyblock.env import DONE, PhyBlockEnv
@@ -21,9 +20,10 @@ from phyblock.scoring.pose import blocks_reached
 from phyblock.sim.dynamics import execute
 from phyblock.sim.geometry import put
 from phyblock.types import SETTINGS
+from tests.shipped import TASKS
 from tests.tracks.conftest import seesaw
 
-SOME = read_data_set("phyblock-400").tasks[::20]
+SOME = TASKS[::20]
 
 
 def solve(env, info):

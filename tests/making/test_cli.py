@@ -12,9 +12,10 @@ from PIL import Image
 
 from phyblock.cli.main import phyblock
 from phyblock.errors import DataError, InputError, StoreError
-from phyblock.files import LIST, bundled
+from phyblock.files import LIST
 from phyblock.sim.engine import other_engine
 from phyblock.workers import open_workers
+from tests.shipped import DATA
 from tests.workspace import SCENES, invoked, read_lines, tower, write_lines
 
 ALONE = ("--jobs", 1)
@@ -87,9 +88,8 @@ def test_a_set_holds_nothing_of_those_that_it_excludes(folder, tmp_path):
     swapped = {"red": "blue", "blue": "green", "green": "yellow", "yellow": "red"}
     lines = re.sub("|".join(swapped), lambda found: swapped[found[0]], lines)
     (painted / "scenes.jsonl").write_text(lines, encoding="utf-8")
-    assert (
-        "of 3 scenes: 0 equal, 3 equal but for colors" in scenes("compare", folder, painted).stdout
-    )
+    said = "of 3 scenes: 0 equal, 3 equal but for colors"
+    assert said in scenes("compare", folder, painted).stdout
 
 
 def test_a_season_is_made_again_from_what_was_revealed_and_from_nothing_else(tmp_path):
@@ -201,9 +201,7 @@ def test_render_names_views_backgrounds_and_kinds(data, tmp_path):
 def asked(tmp_path_factory):
     """Eight questions about twelve scenes of the built-in set, which stand beside them."""
     folder = tmp_path_factory.mktemp("vqa")
-    lines = bundled("benchmarks", "data", "phyblock-400", "scenes.jsonl").read_text("utf-8")
-    some = "".join(f"{line}\n" for line in lines.splitlines()[5::33])
-    (folder / "scenes.jsonl").write_text(some, encoding="utf-8")
+    write_lines(folder / "scenes.jsonl", read_lines(DATA / "phyblock-400" / "scenes.jsonl")[5::33])
     told = vqa("generate", "--data", folder, "--out", folder / "q", *SMALL)
     assert "8 questions in 2 subtasks, " in told.stdout
     assert ("made with" in told.stderr) == bool(other_engine())

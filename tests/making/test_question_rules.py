@@ -9,12 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from phyblock.data.scenes import read_builtin
 from phyblock.domain.blocks import COLORS, SHAPES
 from phyblock.domain.question import LETTERS, Mark, QuestionPicture
 from phyblock.domain.scene import Block, Scene
 from phyblock.domain.symmetry import SYMMETRIES
-from phyblock.files import bundled
 from phyblock.making.questions import dynamics
 from phyblock.making.questions.base import WORDINGS, Draft, UnfairError, four_alike, ranks_among
 from phyblock.making.questions.guesses import keeping_odds
@@ -26,10 +24,11 @@ from phyblock.making.scenes.sketch import POSES, lowered, transformed
 from phyblock.sim.balance import is_balanced
 from phyblock.sim.contact import find_gaps, find_overlaps, support_graph
 from phyblock.sim.question_pictures import seen, seen_order
+from tests.shipped import TASKS
 from tests.sim.structures import block as solid
 from tests.sim.structures import tower
 
-SCENES = [t.scene for t in read_builtin(bundled("benchmarks", "data", "phyblock-400")).tasks]
+SCENES = [task.scene for task in TASKS]
 FEATURES = ("color", "type", "layer", "side", "support")
 scenes = st.sampled_from(SCENES[::9])
 seeds = st.integers(0, 2**32 - 1)
@@ -211,9 +210,8 @@ def test_what_plainly_becomes_of_a_block_is_what_statics_say():
         for at, outcome in zip(points.at_m.tolist(), outcomes.tolist(), strict=True):
             lowest = lowered(put, plain.blocks, *at[:2])
             if outcome:
-                said[
-                    outcome, is_balanced(dynamics.group_of((*plain.blocks, lowest), put.order))
-                ] += 1
+                group = dynamics.group_of((*plain.blocks, lowest), put.order)
+                said[outcome, is_balanced(group)] += 1
     assert {outcome for outcome, _ in said} == {1, 2, 3}
     for outcome, _ in said:
         stays = outcome == dynamics.STAYS

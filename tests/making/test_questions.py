@@ -9,11 +9,9 @@ import numpy as np
 import pytest
 
 from phyblock.data.questions import StoredQuestion, read_questions
-from phyblock.data.scenes import read_builtin
 from phyblock.domain.blocks import COLORS
 from phyblock.domain.question import LETTERS, SUBTASKS, rotated
 from phyblock.errors import DataError
-from phyblock.files import bundled
 from phyblock.making.files import question_card
 from phyblock.making.questions.audit import audit_questions, duplicates_of
 from phyblock.making.questions.dynamics import OUTCOME_TEXTS
@@ -24,12 +22,12 @@ from phyblock.sim.engine import other_engine
 from phyblock.sim.pictures import COLOR_RGB
 from phyblock.sim.question_pictures import is_inside, least_difference, seen
 from phyblock.workers import open_workers
+from tests.shipped import DATA, TASKS, built_in_questions
 from tests.workspace import questions as asked_questions
 from tests.workspace import write_questions as write_asked
 
-FOLDER = bundled("benchmarks", "data", "phyblock-vqa")
-DATA = read_builtin(bundled("benchmarks", "data", "phyblock-400"))
-SCENES = {task.scene.id: task.scene for task in DATA.tasks}
+FOLDER = DATA / "phyblock-vqa"
+SCENES = {task.scene.id: task.scene for task in TASKS}
 SOME = list(SCENES.values())[3::40]
 STATIC = ("SH", "CO", "SI", "NU", "RP", "AP", "RD", "RR", "OC", "LC", "TC")
 ASKED = {
@@ -158,16 +156,15 @@ def test_too_few_scenes_are_told_for_all_subtasks_at_once():
 
 @pytest.fixture(scope="module")
 def built_in():
-    return read_questions(FOLDER, DATA)
+    return [task.question for task in built_in_questions().tasks]
 
 
 def test_the_built_in_set_is_whole_and_even(built_in):
-    asked = [task.question for task in built_in.tasks]
     counts = {s: MAKERS[s].count for s in SUBTASKS}
-    assert Counter(q.subtask for q in asked) == counts
-    assert not duplicates_of(asked)
+    assert Counter(q.subtask for q in built_in) == counts
+    assert not duplicates_of(built_in)
     for subtask in SUBTASKS:
-        answers = [question.answer for question in asked if question.subtask == subtask]
+        answers = [question.answer for question in built_in if question.subtask == subtask]
         if subtask == "OR":
             assert len(set(answers)) > 12
             continue
@@ -179,21 +176,20 @@ def test_the_built_in_set_is_whole_and_even(built_in):
     shipped = (FOLDER / "CARD.md").read_text(encoding="utf-8")
     made_by = shipped.split("\n\n    ", 1)[1].splitlines()[0]
     if not other_engine():
-        assert question_card(FOLDER.name, "phyblock-400", asked, made_by) == shipped
+        assert question_card(FOLDER.name, "phyblock-400", built_in, made_by) == shipped
 
 
 @pytest.mark.parametrize("every", [37, pytest.param(1, marks=pytest.mark.slow)])
 def test_answers_of_the_built_in_set_are_derived_again(built_in, every):
-    asked = [task.question for task in built_in.tasks]
-    by_subtask = itertools.groupby(asked, lambda question: question.subtask)
+    by_subtask = itertools.groupby(built_in, lambda question: question.subtask)
     some = [question for _, of in by_subtask for question in list(of)[7 % every :: every]]
     assert {q.id: problem for q in some if (problem := problem_of(q))} == {}
     if every == 1:
-        assert all(problem_of(wrong_answer(question)) is not None for question in asked[3::44])
+        assert all(problem_of(wrong_answer(question)) is not None for question in built_in[3::44])
 
 
 def test_places_that_no_mark_shows_are_found_out(built_in):
-    first = next(t.question for t in built_in.tasks if t.question.subtask == "AD")
+    first = next(question for question in built_in if question.subtask == "AD")
     scene, block = first.pictures
     bare = replace(first, pictures=(replace(scene, marks=scene.marks[1:]), block))
     assert problem_of(bare) == "no block is marked A"
