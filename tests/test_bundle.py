@@ -23,7 +23,6 @@ from phyblock.records.files import MANIFEST, RECORDS, Manifest, known_records
 from phyblock.run.manifest import portable_manifest
 from phyblock.text import hex_digest
 from tests.data.broken import with_value
-from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.web.factory import manifest, record
 from tests.workspace import SCENES, Workspace, questions, write_questions
@@ -36,15 +35,9 @@ def made(new_workspace):
     """A model and a baseline in three tracks, and the bundle of the run beside it."""
     workspace = new_workspace(*SCENES[:3])
     write_questions(workspace.root / "questions", questions(per_subtask=2, subtasks=SUBTASKS))
-    workspace.write_suite(
-        tracks=["full_planning", "vqa", "step_planning"],
-        vqa={"path": "./questions", "subtasks": SUBTASKS},
-        steps={"physics": "off"},
-        seeds=[0],
-        models=["random", "alpha"],
-    )
-    with Running(OpenAIChat()) as running:
-        workspace.write_models(running.url, "alpha", price={"input": 0.0, "output": 0.0})
+    tracks = {"tracks": ["full_planning", "vqa", "step_planning"], "steps": {"physics": "off"}}
+    tracks["vqa"] = {"path": "./questions", "subtasks": SUBTASKS}
+    with workspace.served(OpenAIChat(), models=["random", "alpha"], **tracks):
         workspace.completed()
     workspace.does("bundle", "out")
     return workspace

@@ -250,15 +250,15 @@ class Workspace:
     def served(
         self, server: S, *names: str, entry: Mapping[str, Any] | None = None, **suite: Any
     ) -> Iterator[S]:
-        """A server of models of these names, `alpha` alone by default, and a suite that asks them;
-        `entry` has more fields of their entries.
+        """A server of models of these names, `alpha` alone by default, and a suite that asks them
+        unless it names others; `entry` has more fields of their entries.
         """
         from tests.servers.chassis import Running
 
         names = names or ("alpha",)
         with Running(server) as running:
             self.write_models(running.url, *names, **(entry or {}))
-            self.write_suite(**{**suite, "models": list(names)})
+            self.write_suite(**{"models": list(names), **suite})
             yield server
 
     def copied(self, root: Path) -> Workspace:
@@ -368,5 +368,4 @@ def vqa_suite(**fields: Any) -> Raw:
         "tracks": ["vqa"],
         "vqa": {"path": "./questions", **fields},
         "images": {"size_px": 128},
-        "models": ["random", "oracle"],
     }

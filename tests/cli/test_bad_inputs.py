@@ -13,7 +13,6 @@ import pytest
 from phyblock.cli.main import show_problems
 from phyblock.errors import InputError, Problem
 from tests.data.broken import sound_scene, write_checkout
-from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import Workspace, tower
 
@@ -285,14 +284,12 @@ BAD = INPUTS + FOLDERS + CACHES
 def finished(new_workspace):
     """A workspace with a finished run in `out`, replies in the cache, and a server that is gone."""
     made = new_workspace()
-    made.write_suite(models=["random", "alpha"])
     (made.root / "low").mkdir()
     (made.write_scenes(tower("t1", [1, 2], ("red",))) / "scenes.jsonl").rename(
         made.root / "low" / "scenes.jsonl"
     )
     made.write_scenes()
-    with Running(OpenAIChat()) as server:
-        made.write_models(server.url, "alpha")
+    with made.served(OpenAIChat(), models=["random", "alpha"]):
         made.completed()
     return made
 

@@ -15,7 +15,7 @@ from phyblock.errors import StoreError
 from phyblock.files import LIST
 from phyblock.results.tables import write_tables
 from phyblock.web.report import write_report
-from tests.servers.chassis import Faults, Running
+from tests.servers.chassis import Faults
 from tests.servers.openai_chat import OpenAIChat
 from tests.web.factory import LEVELS, manifest, record, score, write_run
 from tests.workspace import COMMAND, files_below, invoked
@@ -23,13 +23,13 @@ from tests.workspace import COMMAND, files_below, invoked
 Prepare = Callable[[Path], None]
 
 
-def in_terminal(workspace, answer, *args):
+def in_terminal(workspace, answer):
     """Run with a terminal of 120 columns, and type `answer` first; exit code and screen. No page,
     which takes seconds.
     """
     master, slave = pty.openpty()
     with subprocess.Popen(
-        [*COMMAND, "run", "suite.yaml", "--out", str(workspace.out), "--no-report", *args],
+        [*COMMAND, "run", "suite.yaml", "--out", str(workspace.out), "--no-report"],
         cwd=workspace.root,
         env=workspace.env | {"TERM": "xterm-256color", "COLUMNS": "120", "LINES": "40"},
         stdin=slave,
@@ -69,10 +69,10 @@ def test_a_terminal_shows_bars_and_then_the_tables(suite):
             return super().error(status, ending, f"[/bold] busy [blink {message}")
 
     faults = Faults({"429": 0.5}, latency_s=0.3, retry_after="0")
-    with Running(Bracketing(faults)) as running:
-        suite.write_models(running.url, "alpha", price={"input": 0.0, "output": 0.0})
-        seeds = ("--set", "seeds=[0,1,2,3]")
-        code, screen = in_terminal(suite, "", "--models", "alpha,oracle", *seeds)
+    entry = {"price": {"input": 0.0, "output": 0.0}}
+    asked = {"models": ["alpha", "oracle"], "seeds": [0, 1, 2, 3]}
+    with suite.served(Bracketing(faults), entry=entry, **asked):
+        code, screen = in_terminal(suite, "")
     assert code == 0
     assert "Continue?" not in screen
     assert "[/bold] busy [blink" in screen
@@ -81,10 +81,9 @@ def test_a_terminal_shows_bars_and_then_the_tables(suite):
 
 @pytest.mark.parametrize(("answer", "code", "calls"), [("n\n", 1, 0), ("y\n", 0, 5)])
 def test_a_person_is_asked_before_money_is_spent(suite, answer, code, calls):
-    with Running(OpenAIChat()) as running:
-        suite.write_models(running.url, "alpha", price={"input": 1.0, "output": 1.0})
-        found, screen = in_terminal(suite, answer, "--models", "alpha")
-        assert (found, running.server.requests) == (code, calls)
+    with suite.served(OpenAIChat(), entry={"price": {"input": 1.0, "output": 1.0}}) as server:
+        found, screen = in_terminal(suite, answer)
+    assert (found, server.requests) == (code, calls)
     assert "5 calls, about $" in screen
     assert "Continue?" in screen
     assert ("Nothing was asked." in screen) == (calls == 0)
@@ -92,29 +91,28 @@ def test_a_person_is_asked_before_money_is_spent(suite, answer, code, calls):
 
 
 def test_nothing_is_spent_unasked_where_nobody_can_be_asked(suite):
-    with Running(OpenAIChat()) as running:
-        suite.write_models(running.url, "alpha", price={"input": 1.0, "output": 1.0})
-        refused = suite.run("--models", "alpha")
-        assert (refused.code, running.server.requests) == (2, 0)
+    with suite.served(OpenAIChat(), entry={"price": {"input": 1.0, "output": 1.0}}) as server:
+        refused = suite.run()
+        assert (refused.code, server.requests) == (2, 0)
         assert "would cost money, and there is no terminal to ask on" in refused.err
         assert "5 calls, about $" in refused.out
         assert not suite.out.exists()
-        running.server.faults = Faults(mode="400")
+        server.faults = Faults(mode="400")
         limit = ["--set", "limits.max_cost_usd=1"]
-        rejected = suite.run("--models", "alpha", *limit)
-        assert (rejected.code, running.server.requests) == (1, 5), rejected.err
+        rejected = suite.run(*limit)
+        assert (rejected.code, server.requests) == (1, 5), rejected.err
         # What was rejected is asked again only where somebody agrees to that.
-        assert suite.run("--models", "alpha").code == 1
-        again = suite.run("--models", "alpha", "--retry-failed")
-        assert (again.code, running.server.requests) == (2, 5)
+        assert suite.run().code == 1
+        again = suite.run("--retry-failed")
+        assert (again.code, server.requests) == (2, 5)
         assert "5 calls, about $" in again.out
-        running.server.faults = Faults()
-        limited = suite.run("--models", "alpha", *limit, "--retry-failed")
-        assert (limited.code, running.server.requests) == (0, 10), limited.err
-        more = ["--models", "alpha", "--set", "seeds=[7]"]
-        assert (suite.run(*more).code, running.server.requests) == (2, 10)
+        server.faults = Faults()
+        limited = suite.run(*limit, "--retry-failed")
+        assert (limited.code, server.requests) == (0, 10), limited.err
+        more = ["--set", "seeds=[7]"]
+        assert (suite.run(*more).code, server.requests) == (2, 10)
         suite.completed(*more, "--yes")
-        assert running.server.requests == 15
+        assert server.requests == 15
 
 
 def test_the_folder_of_a_run_is_found_again_without_naming_it(suite):

@@ -207,28 +207,20 @@ def test_batches(kind, route, faults, kills):
         assert set(answered.values()) == {1}, answered
 
 
-class Moody(OpenAIChat):
-    """Counts up to ninety times the tokens that are expected, and knows what it billed."""
-
-    def __init__(self, draw):
-        super().__init__()
-        self._draw = draw
-        self.billed_usd = 0.0
-
-    def reply(self, seen, ending):
-        prompt, completion = (int(10 ** self._draw.uniform(1, most)) for most in (4.4, 4.9))
-        self.billed_usd += (prompt * PRICE["input"] + completion * PRICE["output"]) / 1e6
-        usage = {"prompt_tokens": prompt, "completion_tokens": completion}
-        return {**super().reply(seen, ending), "usage": usage}
-
-
 @pytest.mark.parametrize("number", range(-(-FAULTS // 40)))
 def test_no_more_is_spent_than_the_limit_and_what_was_under_way(workspace, tallies, number):
     draw = random.Random(f"{SEED} costs {number}")
     limit = 10 ** draw.uniform(-1, 2)
-    with workspace.served(
-        Moody(draw), entry={"price": PRICE, "max_tokens": 999}, seeds=list(range(8))
-    ) as server:
+    billed = []
+
+    def usage(_):
+        """Up to ninety times the tokens that are expected."""
+        tokens = tuple(int(10 ** draw.uniform(1, most)) for most in (4.4, 4.9))
+        billed.append((tokens[0] * PRICE["input"] + tokens[1] * PRICE["output"]) / 1e6)
+        return tokens
+
+    entry = {"price": PRICE, "max_tokens": 999}
+    with workspace.served(OpenAIChat(usage=usage), entry=entry, seeds=list(range(8))):
         done = workspace.run("--set", f"limits.max_cost_usd={limit}")
         assert done.code in (0, 1), done.err
     ended = {}
@@ -243,5 +235,5 @@ def test_no_more_is_spent_than_the_limit_and_what_was_under_way(workspace, talli
             spent_at_last = sum(ended.values())
             assert len(sent) - len(ended) <= 1 + len(ended), "more at once than were answered"
     assert spent_at_last <= limit + 1e-9, "a call was sent beyond the limit"
-    assert sum(ended.values()) == pytest.approx(server.billed_usd), "spend is not what was billed"
+    assert sum(ended.values()) == pytest.approx(sum(billed)), "spend is not what was billed"
     tallies.setdefault("costs", Counter()).update({"calls": len(sent), "stopped": done.code})

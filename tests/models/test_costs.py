@@ -232,18 +232,9 @@ def test_what_is_learned_stays_within_bounds(counts):
 
 
 @pytest.mark.parametrize("route", ["direct", "openai"])
-@pytest.mark.parametrize(
-    "usage",
-    [
-        None,
-        {"prompt_tokens": 0, "completion_tokens": 0, "total_tokens": 0},
-        {"prompt_tokens": -(10**6), "completion_tokens": -5, "total_tokens": -5},
-        {"prompt_tokens": 10**30, "completion_tokens": 10**30, "total_tokens": 10**30},
-    ],
-    ids=["none", "zero", "negative", "absurd"],
-)
+@pytest.mark.parametrize("usage", ["null", "zero", "negative", "huge"])
 def test_a_server_that_does_not_count_stops_within_the_limit(route, usage):
-    server = OpenAIChat(usage=usage)
+    server = OpenAIChat(Faults(mode=f"usage-{usage}"))
     budget = Budget(0.1)
     with Running(server) as running:
         config = ROUTES[route].config(running.url, price=PRICE, max_concurrency=4)

@@ -130,14 +130,8 @@ def test_both_transports_put_the_same_json_on_the_wire(wire, extra):
 
 @pytest.mark.parametrize("route", ["direct", "openai"])
 def test_thoughts_left_in_the_text_become_reasoning(route):
-    class Thinker(OpenAIChat):
-        def reply(self, seen, ending):
-            content = "<think>\nred first\n</think>\n\nStep1: Move block with index 3"
-            message = {"role": "assistant", "content": content}
-            choices = [{"message": message, "finish_reason": "stop"}]
-            return {**super().reply(seen, ending), "choices": choices}
-
-    with Running(Thinker()) as running:
+    text = "<think>\nred first\n</think>\n\nStep1: Move block with index 3"
+    with Running(OpenAIChat(say=lambda _: text, think=lambda _: None)) as running:
         (reply,) = ask(make_model(ROUTES[route].config(running.url)), make_request())
     assert reply.text.strip() == "Step1: Move block with index 3"
     assert reply.reasoning.strip() == "red first"

@@ -10,7 +10,7 @@ from phyblock.config.suite import load_suite
 from phyblock.models.costs import text_tokens
 from phyblock.run.plan import estimate, make_plan
 from tests.models.factory import ROUTES
-from tests.servers.billing import COMPLETION, PROVIDERS, BillingOpenAI, o200k_tokens, tile_tokens
+from tests.servers.billing import COMPLETION, PROVIDERS, Bill, o200k_tokens, tile_tokens
 from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat, answered
 from tests.workspace import (
@@ -51,16 +51,11 @@ def test_the_limit_is_not_passed_and_a_higher_one_goes_on(workspace):
         assert server.requests == 60
 
 
-@pytest.mark.parametrize(
-    "server",
-    [OpenAIChat(usage=None), OpenAIChat(Faults(mode="html")), OpenAIChat(Faults(mode="reset"))],
-    ids=["no usage", "no reply", "no answer"],
-)
-def test_what_an_earlier_run_may_have_paid_counts_in_the_next(workspace, server):
+@pytest.mark.parametrize("mode", ["usage-null", "html", "reset"])
+def test_what_an_earlier_run_may_have_paid_counts_in_the_next(workspace, mode):
     dearest_reply_usd = 1000 * PRICE["output"] / 1e6
-    with workspace.served(
-        server, entry={"price": PRICE, "max_tokens": 1000}, seeds=list(range(4)), limits=TWICE
-    ) as server:
+    server, entry = OpenAIChat(Faults(mode=mode)), {"price": PRICE, "max_tokens": 1000}
+    with workspace.served(server, entry=entry, seeds=list(range(4)), limits=TWICE):
         codes = [workspace.run("--set", "limits.max_cost_usd=1").code for _ in range(3)]
     assert codes == [1, 1, 1]
     assert 2 <= server.requests <= 1 / dearest_reply_usd
@@ -87,11 +82,11 @@ def planned(workspace):
 
 def begin(workspace, stack):
     """Write a suite and its models, each behind a server that bills as its provider does."""
-    servers = {model_id.partition("/")[2]: make() for model_id, make in PROVIDERS.items()}
-    entries = {}
-    for model_id, (name, server) in zip(PROVIDERS, servers.items(), strict=True):
-        path = ROUTES[model_id.partition("/")[0]].path
-        url = stack.enter_context(Running(server)).url + path
+    bills, entries = {}, {}
+    for model_id, (kind, bill) in PROVIDERS.items():
+        provider, _, name = model_id.partition("/")
+        bills[name] = bill()
+        url = stack.enter_context(Running(kind(usage=bills[name]))).url + ROUTES[provider].path
         about = {"id": model_id, "api_base": url, "temperature": None, "price": TARIFF}
         entries[name] = about
     workspace.write_yaml("models.yaml", entries)
@@ -100,10 +95,10 @@ def begin(workspace, stack):
         tracks=["full_planning", "vqa"],
         vqa={"path": "./questions"},
         images={"size_px": 512},
-        models=list(servers),
+        models=list(bills),
         limit=CALLS // 2,
     )
-    return servers
+    return bills
 
 
 def dollars(prompt_tokens, replies):
@@ -112,14 +107,14 @@ def dollars(prompt_tokens, replies):
 
 def test_a_dry_run_is_near_the_bill_of_every_provider(workspace):
     with ExitStack() as stack:
-        servers = begin(workspace, stack)
+        bills = begin(workspace, stack)
         plan = planned(workspace)
         rows = estimate(plan, workspace.out, use_cache=False)
         workspace.completed("--yes", "--no-cache")
         left = estimate(plan, workspace.out, use_cache=False)
     records = workspace.records()
     for row in rows:
-        billed = servers[row.model.name].billed
+        billed = bills[row.model.name].billed
         assert (row.calls, len(billed)) == (CALLS, CALLS)
         assert row.prompt_tokens == pytest.approx(sum(billed), rel=WITHIN), row.model.name
         replies = row.reply_tokens / COMPLETION
@@ -149,17 +144,17 @@ def test_texts_count_as_the_public_vocabulary_does(workspace, track):
 
 
 def test_episodes_are_billed_no_more_than_a_dry_run_expects(workspace):
-    server = BillingOpenAI(o200k_tokens, tile_tokens, 3, say=answered)
-    with Running(server) as running:
+    bill = Bill(o200k_tokens, tile_tokens, 3)
+    with Running(OpenAIChat(say=answered, usage=bill)) as running:
         entry = {"id": "openai/gpt-4o-2024-08-06", "api_base": f"{running.url}/v1", "price": TARIFF}
         workspace.write_yaml("models.yaml", {"m": entry})
         workspace.write_suite(tracks=["step_planning"], models=["m"], limit=2)
         plan = planned(workspace)
         (row,) = estimate(plan, workspace.out, use_cache=False)
         workspace.completed("--yes", "--no-cache")
-    assert len(server.billed) <= row.calls
-    assert sum(server.billed) <= row.prompt_tokens * (1 + WITHIN)
-    a_call, expected = sum(server.billed) / len(server.billed), row.prompt_tokens / row.calls
+    assert len(bill.billed) <= row.calls
+    assert sum(bill.billed) <= row.prompt_tokens * (1 + WITHIN)
+    a_call, expected = sum(bill.billed) / len(bill.billed), row.prompt_tokens / row.calls
     assert a_call == pytest.approx(expected, rel=WITHIN)
 
 

@@ -24,9 +24,7 @@ SCORED = ("estimates.csv", "errors.csv", "errors.tex", "table1.csv", "table1.tex
 def finished(new_workspace):
     """A run of a model that answers, one whose every call fails, and two baselines."""
     made = new_workspace()
-    made.write_suite(models=["alpha", "random", "oracle"], seeds=[0, 1, 2])
-    with Running(OpenAIChat()) as running:
-        made.write_models(running.url, "alpha")
+    with made.served(OpenAIChat(), models=["alpha", "random", "oracle"], seeds=[0, 1, 2]):
         made.completed()
     return made
 

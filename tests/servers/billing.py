@@ -14,7 +14,6 @@ import io
 import math
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 import tiktoken
@@ -89,17 +88,15 @@ def _size(data: str) -> tuple[int, int]:
     return Image.open(io.BytesIO(base64.b64decode(data))).size
 
 
-class Billing(LocalServer):
-    """Counts every prompt; `billed` has those of each sample."""
+class Bill:
+    """Counts every prompt as a provider does; `billed` has those of each sample."""
 
     def __init__(
         self,
         text_tokens: Callable[[str], float],
         picture_tokens: Callable[[int, int], int],
         a_message: int = 0,
-        **options: Any,
     ) -> None:
-        super().__init__(**options)
         # Vocabularies are read here, not by the thread that serves: while it imports what reads
         # them, litellm finds that half imported.
         text_tokens("")
@@ -107,52 +104,26 @@ class Billing(LocalServer):
         self._text_tokens, self._picture_tokens = text_tokens, picture_tokens
         self._a_message = a_message
 
-    def count(self, raw: dict[str, Any]) -> int:
-        """The tokens of a request's prompt."""
-        parts = list(_contents({k: v for k, v in raw.items() if k != "model"}))
+    def __call__(self, seen: Seen) -> tuple[int, int]:
+        parts = list(_contents({k: v for k, v in seen.raw.items() if k != "model"}))
         texts = sum(self._text_tokens(part) for part in parts if isinstance(part, str))
         pictures = sum(self._picture_tokens(*part) for part in parts if not isinstance(part, str))
-        around = self._a_message * (len(raw.get("messages", ())) + 1)
+        around = self._a_message * (len(seen.raw.get("messages", ())) + 1)
         self.billed.append(math.ceil(texts) + pictures + around)
-        return self.billed[-1]
+        return self.billed[-1], COMPLETION
 
 
-class BillingOpenAI(Billing, OpenAIChat):
-    """OpenAI's bill."""
-
-    def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
-        usage = {"prompt_tokens": self.count(seen.raw), "completion_tokens": COMPLETION}
-        usage["total_tokens"] = sum(usage.values())
-        return {**super().reply(seen, ending), "usage": usage}
+def _claude_texts(text: str) -> float:
+    return len(_claude().encode(text).ids)
 
 
-class BillingAnthropic(Billing, AnthropicMessages):
-    """Anthropic's bill."""
-
-    def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
-        usage = {"input_tokens": self.count(seen.raw), "output_tokens": COMPLETION}
-        return {**super().reply(seen, ending), "usage": usage}
-
-
-class BillingGemini(Billing, GeminiGenerate):
-    """Google's bill."""
-
-    def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
-        prompt = self.count(seen.raw)
-        usage = {
-            "promptTokenCount": prompt,
-            "candidatesTokenCount": COMPLETION,
-            "totalTokenCount": prompt + COMPLETION,
-        }
-        return {**super().reply(seen, ending), "usageMetadata": usage}
-
-
-PROVIDERS: dict[str, Callable[[], Billing]] = {
-    "openai/gpt-4o-2024-08-06": lambda: BillingOpenAI(o200k_tokens, tile_tokens, 3),
-    "openai/gpt-5.6": lambda: BillingOpenAI(o200k_tokens, patch_tokens, 3),
-    "anthropic/claude-opus-5-5": lambda: BillingAnthropic(
-        lambda text: len(_claude().encode(text).ids), claude_tokens
+PROVIDERS: dict[str, tuple[type[LocalServer], Callable[[], Bill]]] = {
+    "openai/gpt-4o-2024-08-06": (OpenAIChat, lambda: Bill(o200k_tokens, tile_tokens, 3)),
+    "openai/gpt-5.6": (OpenAIChat, lambda: Bill(o200k_tokens, patch_tokens, 3)),
+    "anthropic/claude-opus-5-5": (AnthropicMessages, lambda: Bill(_claude_texts, claude_tokens)),
+    "gemini/gemini-3.8-flash": (
+        GeminiGenerate,
+        lambda: Bill(lambda text: len(text) / 4, lambda *_: 1120),
     ),
-    "gemini/gemini-3.8-flash": lambda: BillingGemini(lambda text: len(text) / 4, lambda *_: 1120),
 }
-"""By model, a server that bills as its provider does."""
+"""By model, a server of its protocol, and how its provider bills."""

@@ -15,7 +15,7 @@ import json
 import threading
 from abc import ABC, abstractmethod
 from collections import Counter
-from collections.abc import Coroutine, Mapping, Sequence
+from collections.abc import Callable, Coroutine, Mapping, Sequence
 from contextlib import AbstractAsyncContextManager, nullcontext
 from dataclasses import dataclass, field
 from typing import Any
@@ -102,6 +102,7 @@ class LocalServer(ABC):
 
     `elsewhere` is where redirects to another host lead. At most `width` requests are looked at
     together; None is no bound. While it `holds`, which a test may end, no request is answered.
+    `usage` counts the tokens of a prompt and its reply.
     """
 
     def __init__(
@@ -112,6 +113,7 @@ class LocalServer(ABC):
         elsewhere: str = ELSEWHERE,
         width: int | None = None,
         holds: bool = False,
+        usage: Callable[[Seen], tuple[int, int]] = lambda _: (1000, 40),
     ) -> None:
         self._gate: AbstractAsyncContextManager[None] = (
             nullcontext() if width is None else asyncio.Semaphore(width)
@@ -119,6 +121,7 @@ class LocalServer(ABC):
         self.keep = keep
         self.elsewhere = elsewhere
         self.holds = holds
+        self.usage = usage
         self.at_once = 0
         self.forget(faults)
 

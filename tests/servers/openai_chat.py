@@ -9,14 +9,11 @@ from aiohttp import web
 
 from tests.servers.chassis import Faults, LocalServer, Seen, main, picture_part
 
-USAGE = {"prompt_tokens": 1000, "completion_tokens": 40, "total_tokens": 1040}
 _CODES = {"policy": "content_policy_violation", "quota": "insufficient_quota"}
 
 
 class OpenAIChat(LocalServer):
-    """POST /v1/chat/completions; a reply says what `say` gives and reasons what `think` gives, and
-    `usage` is told of each.
-    """
+    """POST /v1/chat/completions; a reply says what `say` gives and reasons what `think` gives."""
 
     def __init__(
         self,
@@ -24,11 +21,10 @@ class OpenAIChat(LocalServer):
         *,
         say: Callable[[Seen], str] = lambda seen: seen.reply_text,
         think: Callable[[Seen], str] = lambda _: "Let me see.",
-        usage: object = USAGE,
         **options: Any,
     ) -> None:
         super().__init__(faults, **options)
-        self.say, self.think, self.usage = say, think, usage
+        self.say, self.think = say, think
 
     def add_routes(self, app: web.Application) -> None:
         app.router.add_post("/v1/chat/completions", self.handle)
@@ -49,6 +45,8 @@ class OpenAIChat(LocalServer):
         finish = {"length": "length", "filtered": "content_filter"}.get(ending, "stop")
         text = "" if ending in ("length", "filtered", "blank") else self.say(seen)
         message = {"role": "assistant", "content": text, "reasoning_content": self.think(seen)}
+        prompt, completion = self.usage(seen)
+        usage = {"prompt_tokens": prompt, "completion_tokens": completion}
         choice = {"index": 0, "message": message, "finish_reason": finish}
         return {
             "id": f"chatcmpl-{seen.sample}",
@@ -56,7 +54,7 @@ class OpenAIChat(LocalServer):
             "created": 1_700_000_000,
             "model": f"{seen.model}-served",
             "choices": [] if ending == "empty" else [choice],
-            "usage": self.usage,
+            "usage": {**usage, "total_tokens": prompt + completion},
         }
 
     def error(self, status: int, ending: str, message: str) -> dict[str, Any]:

@@ -28,6 +28,7 @@ class AnthropicMessages(LocalServer):
     def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
         stop = {"length": "max_tokens", "filtered": "refusal"}.get(ending, "end_turn")
         text = "" if ending in ("length", "filtered", "blank") else seen.reply_text
+        prompt, completion = self.usage(seen)
         body = {
             "id": f"msg_{seen.sample}",
             "type": "message",
@@ -39,7 +40,7 @@ class AnthropicMessages(LocalServer):
             ],
             "stop_reason": stop,
             "stop_sequence": None,
-            "usage": {"input_tokens": 1000, "output_tokens": 40},
+            "usage": {"input_tokens": prompt, "output_tokens": completion},
         }
         return {"type": "message"} if ending == "empty" else body
 
@@ -80,8 +81,9 @@ class GeminiGenerate(LocalServer):
         parts = [{"text": "Let me see.", "thought": True}, {"text": text}]
         content = {"role": "model", "parts": parts}
         candidate = {"content": content, "finishReason": finish, "index": 0}
-        usage = {"promptTokenCount": 1000, "candidatesTokenCount": 30, "thoughtsTokenCount": 10}
-        usage["totalTokenCount"] = sum(usage.values())
+        prompt, completion = self.usage(seen)
+        usage = {"promptTokenCount": prompt, "totalTokenCount": prompt + completion}
+        usage |= {"candidatesTokenCount": completion - 10, "thoughtsTokenCount": 10}
         body = {"candidates": [candidate], "usageMetadata": usage, "modelVersion": seen.model}
         return {} if ending == "empty" else body
 
