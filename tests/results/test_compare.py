@@ -89,6 +89,31 @@ def test_what_cannot_be_told_is_said():
         assert verdicts["overall"] == verdict
 
 
+def test_a_gap_is_found_among_many_models_and_ranks_say_what_is_sure():
+    scenes = [f"{n:03}" for n in range(60)]
+    draw = np.random.default_rng(7)
+    strength = {"best": 0.75, **{f"model-{n:02}": 0.5 for n in range(25)}}
+    run = one_seed(
+        *(
+            one
+            for model, share in strength.items()
+            for one in plans(model, {scene: int(draw.binomial(4, share)) for scene in scenes})
+        ),
+        models=list(strength),
+        scenes_by_level={2: 60},
+        items={"full_planning": 60},
+        scenes=60,
+        levels=[2],
+    )
+    found = compare(run)
+    assert len(found.table) == 26 * 25 // 2
+    against_best = found.table[found.table["a"] == "best"]
+    assert (against_best["verdict"] == "best is better").all()
+    ranks = found.ranks.set_index("model")
+    assert tuple(ranks.loc["best", ["best", "worst"]]) == (1, 1)
+    assert (ranks.loc[ranks.index != "best", "best"] > 1).all()
+
+
 def test_two_runs_are_compared_by_the_models_they_share_or_by_two_named():
     first = one_seed(*plans("alpha", {"000": 4, "001": 2}), models=["alpha"])
     second = run_of(

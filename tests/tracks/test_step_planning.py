@@ -13,9 +13,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from phyblock.domain.scene import AssemblyTask, Block, Candidate, CandidateSet, Scene
+from phyblock.models.request import Image
 from phyblock.parsing.move import MOVE_PROBLEMS
 from phyblock.records.record import Reply
 from phyblock.scoring.steps import MOVE_OUTCOMES
+from phyblock.tracks.pictures import Workshop
 from phyblock.tracks.step_planning import ENDINGS, STEP_RULES, Feedback, PastStep
 from phyblock.types import SETTINGS
 from tests.parsing.test_replies import ROWS
@@ -245,3 +247,30 @@ def test_feedback_tells_no_more_than_it_may(feedback):
     assert len(wrong) == (5 if feedback == "error_type" else 1)
     assert all(words.startswith("it failed") for words in wrong)
     assert told["no_move"] == "it failed, no operation could be read"
+
+
+def test_pictures_of_states_are_drawn_and_kept(tmp_path):
+    """An episode sees one picture a state; a second episode finds them all."""
+
+    async def play(track, task):
+        episode = track.start(task, 0, {}, with_messages=True)
+        seen = []
+        while (request := await episode.request()) is not None:
+            seen.append([p.data for p in request.messages[1].parts if isinstance(p, Image)])
+            move = request.subject.valid[0]
+            episode.take(Reply(text=f"Move({move})"))
+        return seen
+
+    found, task = [], TASKS[0]
+    for expected in (2 + len(task.scene), 0):
+        shop = Workshop(1, tmp_path)
+        images = {"layout": "separate"}
+        track = track_of("step_planning", [task], shop, images=images, steps={"physics": "settle"})
+        found.append(asyncio.run(play(track, task)))
+        assert shop.rendered == expected
+        outlines = list(track.outlines(task))
+        are_real = [all(one.data for one in outline.images) for outline in outlines]
+        assert are_real == [True] + [False] * (len(outlines) - 1)
+        track.close()
+    assert found[0] == found[1]
+    assert len({step[2] for step in found[0]}) == len(task.scene)
