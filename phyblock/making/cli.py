@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
-from itertools import chain
+from itertools import chain, product
 from operator import call
 from pathlib import Path
 from typing import Any, TypeVar
@@ -440,16 +440,15 @@ def render(
     views = [name for name in VIEWS if view in (name, "all")]
     floors = [name for name in BACKGROUNDS if background in (name, "all")]
     drawings: dict[str, Callable[[], bytes]] = {}
-    for task in map(read.task, names) if names else read.tasks:
-        for seen in views:
-            for floor in floors:
-                style = PictureStyle(512, floor, *VIEWS[seen])
-                stem = f"{task.scene.id}-{seen}-{floor}"
-                drawings[f"{stem}.png"] = partial(goal_png, task.scene, style)
-                if composite:
-                    drawings[f"{stem}-composite.png"] = partial(_composite, task, style)
-                if gif:
-                    drawings[f"{stem}.gif"] = partial(assembly_gif, task.scene, style)
+    tasks = [*map(read.task, names)] if names else read.tasks
+    for task, seen, floor in product(tasks, views, floors):
+        style = PictureStyle(512, floor, *VIEWS[seen])
+        stem = f"{task.scene.id}-{seen}-{floor}"
+        drawings[f"{stem}.png"] = partial(goal_png, task.scene, style)
+        if composite:
+            drawings[f"{stem}-composite.png"] = partial(_composite, task, style)
+        if gif:
+            drawings[f"{stem}.gif"] = partial(assembly_gif, task.scene, style)
     OutFolder(out).check(drawings)
     work = f"scenes render: {read.sha256} {hex_digest(repr([RENDER_VERSION, *drawings]))}\n"
     shards = open_shards(shard, out, work)

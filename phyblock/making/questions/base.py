@@ -1,6 +1,6 @@
 """The base of all kinds of questions: a maker proposes questions and derives their answers again.
 
-`StaticMaker.right` and `Maker.rederive` are the only places that decide what is right and what is
+`StaticMaker.right` and `Maker.answer` are the only places that decide what is right and what is
 fair: a draft is kept if they find its first option, and `phyblock questions verify` calls them
 again for every stored question.
 """
@@ -72,6 +72,11 @@ class Draft:
         return self.pictures[0]
 
     @property
+    def drawn(self) -> tuple[QuestionPicture, ...]:
+        """The options that are pictures."""
+        return tuple(option for option in self.options if isinstance(option, QuestionPicture))
+
+    @property
     def group(self) -> str:
         """The kind, or else the wording."""
         return self.kind or self.wording
@@ -104,15 +109,15 @@ class Maker(ABC):
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """Propose questions about a scene, in an order drawn with `rng`, without a simulation.
 
-        A draft is kept if it is selected and `rederive` finds its answer.
+        A draft is kept if it is selected and `answer` finds its answer.
         """
 
     @abstractmethod
-    def rederive(self, question: Question) -> tuple[int, ...]:
-        """Return the right answer, derived again from scene, pictures and simulator.
+    def answer(self, asked: Draft) -> tuple[int, ...]:
+        """Return the indices of the right option, or of all in the right order, derived again from
+        scene, pictures, slots and simulator. The options are as in the question, texts or pictures.
 
-        `answer` is never used. Raises UnfairError if there is not exactly one, or something named
-        cannot be seen.
+        Raises UnfairError if there is not exactly one, or something named cannot be seen.
         """
 
 
@@ -134,7 +139,7 @@ class StaticMaker(Maker):
 
     @abstractmethod
     def right(self, asked: Draft) -> str:
-        """Return the text of the right option. Raises UnfairError as `rederive`."""
+        """Return the text of the right option. Raises UnfairError as `answer`."""
 
     def offer(self, asked: Draft, right: str, rng: np.random.Generator) -> Sequence[str]:
         """Return four options, the right one among them, or none if there are too few."""
@@ -156,17 +161,15 @@ class StaticMaker(Maker):
                 shown = replace(scene, blocks=asked.picture.blocks[: len(scene)])
                 yield replace(asked, scene=shown, options=tuple(right_first(right, options)))
 
-    def rederive(self, question: Question) -> tuple[int, ...]:
+    def answer(self, asked: Draft) -> tuple[int, ...]:
         """Return the answer, derived only from the one picture and the slots of the text."""
-        labels = [picture.label for picture in question.pictures]
+        labels, (low, high) = [picture.label for picture in asked.pictures], ELEVATIONS_DEG
         if labels != ["scene"]:
             raise UnfairError(f"has pictures {labels}, not one of the scene alone")
-        (low, high), slots = ELEVATIONS_DEG, slots_of(question)
-        if not low <= question.pictures[0].view_deg[1] <= high:
+        if not low <= asked.picture.view_deg[1] <= high:
             raise UnfairError(f"is not seen from {low} to {high} degrees above the floor")
-        asked = Draft(question.wording, question.scene, question.pictures, slots, question.options)
         right = self.right(asked)
-        return only_index([option == right for option in question.options])
+        return only_index([option == right for option in asked.options])
 
 
 def fill_template(template: str, slots: Slots) -> str:
@@ -175,12 +178,20 @@ def fill_template(template: str, slots: Slots) -> str:
     return text[:1].upper() + text[1:]
 
 
-def slots_of(question: Question) -> Slots:
-    """Return the slots of a text. Raises UnfairError unless its wording with them is the text."""
+def read_again(question: Question) -> Draft:
+    """Return a question as its maker gets it to find the answer, which is not used.
+
+    Options that are pictures are no longer among its `pictures`. Raises UnfairError unless the
+    wording with its slots is the text.
+    """
     slots = question.evidence.get("slots", {})
     if fill_template(WORDINGS[question.wording], slots) != question.text:
         raise UnfairError("the text is not its wording with the slots of the evidence")
-    return {name: str(slot) for name, slot in slots.items()}
+    texts = {name: str(slot) for name, slot in slots.items()}
+    pictures = {picture.label: picture for picture in question.pictures}
+    options = [pictures.pop(a, b) for a, b in zip(LETTERS, question.options, strict=True)]
+    shown = tuple(pictures.values())
+    return Draft(question.wording, question.scene, shown, texts, tuple(options))
 
 
 def only_index(right: Sequence[bool | None]) -> tuple[int]:

@@ -1,17 +1,9 @@
 """CF, PD, AD: effects of removing or adding blocks.
 
-Questions are proposed by statics alone; simulations confirm those that are selected.
-
-CF: the removed block supports others of the scene. It is marked in the picture, so that no word of
-the question hints at the answer.
-
-PD: four pictures show the same blocks laid on an unfinished structure; only in one all stay. The
-plank overhangs less in none, one or two of the others; ranked by the distance of the center of mass
-from the middle of the structure, the right picture has each rank about equally often.
-
-AD: the outcome at each of four places is clear to the eye, and checked with margins. The right
-place has each rank about equally often by distance from the middle of its block, by height, and by
-distance to the nearest higher block.
+Questions are proposed by statics alone; simulations confirm those that are selected. The block that
+CF removes is marked in the picture, so that no word of the question hints at the answer. The right
+options of PD and AD have each rank about equally often in the measures that someone might go by
+(`four_plans`, `four_of`).
 """
 
 from __future__ import annotations
@@ -27,10 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phyblock.domain.blocks import COLORS, SHAPES, BlockType, Euler
-from phyblock.domain.question import LETTERS, Mark, Question, QuestionPicture, Subtask
+from phyblock.domain.question import LETTERS, Mark, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
 from phyblock.making.questions import base, sight
-from phyblock.making.questions.base import Draft, Floats, Maker, UnfairError, pick, shuffled
+from phyblock.making.questions.base import Draft, Floats, Maker, Slots, UnfairError, pick, shuffled
 from phyblock.making.scenes.sketch import lowered
 from phyblock.sim import question_pictures as drawn
 from phyblock.sim.balance import MARGIN_M, is_balanced, surely_falls, surely_stands
@@ -98,18 +90,6 @@ def group_of(blocks: Sequence[Block], order: int) -> tuple[Block, ...]:
     return next(group for group in groups(blocks) if any(b.order == order for b in group))
 
 
-def lots_of(blocks: Sequence[Block]) -> list[list[Block]]:
-    """Return the blocks in lots, each connected by blocks that rest on each other. Blocks that only
-    touch side by side are in different lots: one may fall without the other.
-    """
-    lots: list[set[int]] = []
-    for order, below in support_graph(blocks).items():
-        lot = ({order} | below) - {GROUND}
-        lot = lot.union(*(other for other in lots if other & lot))
-        lots = [other for other in lots if not other & lot] + [lot]
-    return [[block for block in blocks if block.order in lot] for lot in lots]
-
-
 def is_sure(left: Sequence[Block], moved: Collection[int]) -> bool:
     """True if statics are sure of the outcome of a simulation.
 
@@ -117,7 +97,7 @@ def is_sure(left: Sequence[Block], moved: Collection[int]) -> bool:
     weight 5 mm off to any side, other masses, and friction to spare.
     """
     still = [block for block in left if block.order not in moved]
-    falling = lots_of([block for block in left if block.order in moved])
+    falling = sight.lots_of([block for block in left if block.order in moved])
     return all(surely_stands(group) for group in groups(still)) and all(
         surely_falls([*still, *lot]) for lot in falling
     )
@@ -182,14 +162,13 @@ class CounterfactualMaker(Maker):
             right, *others = base.right_first(_outcome_text(len(moved)), OUTCOME_TEXTS)
             options = (right, *shuffled(rng, others))
             yield Draft("cf-count", scene, (shown,), {}, options, facts=facts, about=order)
-            colors, pictures = _by_colors(shown, order, moved, rng)
+            slots, pictures = _by_colors(shown, order, moved, rng)
             if pictures:
-                slots = dict(zip(("color", "other", "taken"), colors, strict=True))
                 yield Draft("cf-color", scene, (shown,), slots, pictures, "", facts, about=order)
 
-    def rederive(self, question: Question) -> tuple[int, ...]:
+    def answer(self, asked: Draft) -> tuple[int, ...]:
         """Simulate the removal again."""
-        slots, shown = base.slots_of(question), sight.picture_of(question, "scene")
+        shown = asked.picture
         order = sight.marked(shown, TAKEN)[1]
         moved = falling(shown.blocks, order)
         outcome = None if moved is None else after_removal(shown.blocks, order)
@@ -198,13 +177,10 @@ class CounterfactualMaker(Maker):
         if not any(order in block.depend for block in shown.blocks):
             raise UnfairError(f"block {order} supports no other")
         sight.require_seen(shown, sight.NAMED, [sight.block_of(shown.blocks, order)])
-        if question.wording != "cf-color":
+        if asked.wording == "cf-count":
             right = _outcome_text(len(moved))
-            return base.only_index([option == right for option in question.options])
-        told = [
-            sight.highlighted(one, shown.blocks, slots, taken=order)
-            for one in sight.option_pictures(question)
-        ]
+            return base.only_index([option == right for option in asked.options])
+        told = [sight.lot_of(one, shown.blocks, asked.slots, order) for one in asked.drawn]
         return base.only_index([one == moved for one in told])
 
 
@@ -224,7 +200,7 @@ def falling(whole: Sequence[Block], order: int) -> Lot | None:
     with_load = [(frozenset({o}) | resting_on(blocks, o)) - {order} for o in near]
     for lot in sorted(_joined(with_load, len(with_load)), key=sorted):
         still = [block for block in left if block.order not in lot]
-        loose = lots_of([block for block in left if block.order in lot])
+        loose = sight.lots_of([block for block in left if block.order in lot])
         is_so = is_balanced(still) and not any(is_balanced([*still, *one]) for one in loose)
         if is_so and surely_stands(blocks) and is_sure(left, lot):
             return None if balances_on_edges(blocks, order, lot) else lot
@@ -252,7 +228,7 @@ def _joined(lots: Sequence[Lot], most: int, enough: int | None = None) -> set[Lo
 
 def _by_colors(
     shown: QuestionPicture, order: int, moved: Lot, rng: np.random.Generator
-) -> tuple[Sequence[str], tuple[QuestionPicture, ...]]:
+) -> tuple[Slots, Sequence[QuestionPicture]]:
     """Return colors, and four pictures that highlight blocks: first those that move, then three
     other sets with all that rests on them. No pictures if there are no such sets.
     """
@@ -266,12 +242,10 @@ def _by_colors(
     unlike = np.array([[sum(pixels[o] for o in a ^ b) for b in lots] for a in lots], dtype=float)
     measures = np.array([_looks_of_lot(plain, order, lot) for lot in lots])
     four = base.four_alike(measures, unlike, sight.LEAST_PIXELS, rng)
-    colors = pick(rng, _COLORS)
-    options = [
-        replace(one, blocks=sight.colored(one.blocks, {order: colors[2]}))
-        for one in (sight.with_lot(plain, lots[place], colors) for place in four)
-    ]
-    return colors, tuple(options) if options and sight.are_told_apart(options) else ()
+    slots = dict(zip(("color", "other", "taken"), pick(rng, _COLORS), strict=True))
+    shades = [sight.highlighted(plain.blocks, lots[place], slots, order) for place in four]
+    options = [replace(plain, blocks=blocks) for blocks in shades]
+    return slots, options if options and sight.are_told_apart(options) else ()
 
 
 def _looks_of_lot(plain: QuestionPicture, taken: int, lot: Lot) -> tuple[float, ...]:
@@ -444,15 +418,13 @@ class PredictiveMaker(Maker):
             tried = (_next_steps(scene, ranks, rng) for _ in range(_BENCHES_TRIED))
             yield from itertools.islice(filter(None, tried), 1)
 
-    def rederive(self, question: Question) -> tuple[int, ...]:
+    def answer(self, asked: Draft) -> tuple[int, ...]:
         """Decide by statics and simulation."""
-        base.slots_of(question)
-        shown, stays = sight.picture_of(question, "scene"), []
-        placed = set(sight.orders_of(shown.blocks))
-        for option in sight.option_pictures(question):
+        placed, stays = set(sight.orders_of(asked.picture.blocks)), []
+        for option in asked.drawn:
             added = [block for block in option.blocks if block.order not in placed]
             kept = tuple(block for block in option.blocks if block.order in placed)
-            if not added or kept != shown.blocks:
+            if not added or kept != asked.picture.blocks:
                 raise UnfairError(f"picture {option.label} does not add to the structure")
             stays.append(surely_stays(option.blocks, added[0].order))
             if stays[-1] is None or holds(option.blocks, added[0].order) is not stays[-1]:
@@ -569,12 +541,12 @@ class AffordanceMaker(Maker):
             tried = (_set_down(scene, rank, rng) for _ in range(_STRUCTURES_TRIED))
             yield from itertools.islice(filter(None, tried), 1)
 
-    def rederive(self, question: Question) -> tuple[int, ...]:
+    def answer(self, asked: Draft) -> tuple[int, ...]:
         """Decide by statics and simulation at every place, and by statics all around it."""
-        slots = base.slots_of(question)
-        shown, alone = (sight.picture_of(question, name) for name in ("scene", drawn.BLOCK_LABEL))
+        shown, alone = asked.pictures
         block = alone.blocks[0]
-        if len(alone.blocks) != 1 or slots.get("size") != _size(block):
+        is_alone = alone.label == drawn.BLOCK_LABEL and len(alone.blocks) == 1
+        if not is_alone or asked.slots["size"] != _size(block):
             raise UnfairError("the second picture is not of one block of the size in the text")
         sight.require_seen(shown, _ALL_SEEN)
         plain, stays = replace(shown, marks=()), []

@@ -25,7 +25,7 @@ from phyblock.domain.question import LETTERS, Mark, Question, QuestionPicture, S
 from phyblock.domain.scene import Scene
 from phyblock.errors import DataError, PhyblockError, Problem
 from phyblock.making.questions import dynamics, properties, relations, views
-from phyblock.making.questions.base import Draft, Maker, pick, shuffled
+from phyblock.making.questions.base import Draft, Maker, pick, read_again, shuffled
 from phyblock.making.questions.guesses import keeping_odds, measures_of
 from phyblock.sim.question_pictures import filled
 from phyblock.types import BACKGROUNDS, Background
@@ -159,7 +159,7 @@ def problem_of(question: Question) -> str | None:
     if small:
         return f"blocks fill less than {_LEAST_FILLED:.0%} of the pictures {small}"
     try:
-        derived = maker.rederive(question)
+        derived = maker.answer(read_again(question))
     except PhyblockError as error:
         return str(error)
     except (KeyError, TypeError, ValueError) as error:

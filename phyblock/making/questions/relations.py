@@ -160,14 +160,7 @@ def _apart(one: Block, other: Block, blocks: Sequence[Block]) -> float:
     x, y, _ = np.abs(sight.center_m(one) - sight.center_m(other)).tolist()
     if min(x, y) > _SIDE_M:
         raise UnfairError("the blocks stand askew, so that their distance cannot be counted")
-    # The two must belong to one structure, connected by supports.
-    reached: set[int] = set()
-    found = {one.order}
-    while found:
-        reached |= found
-        over = {b.order for b in blocks if found.intersection(b.depend)}
-        found = over.union(*(b.depend for b in blocks if b.order in found)) - reached
-    if other.order not in reached:
+    if not any({one, other} <= set(lot) for lot in sight.lots_of(blocks)):
         raise UnfairError("the blocks are parts of structures that stand apart")
     return float(max(x, y))
 
@@ -181,11 +174,8 @@ LENGTHS: Mapping[str, Callable[[Block, Block, Sequence[Block]], float]] = {
 """Lengths [m] by kind, from a block, another, and all blocks; UnfairError for unclear ones."""
 _HEIGHTS = ("ap-top", "ap-bottom")
 """Lengths of one block; together they count as one of three kinds."""
-_LADDERS_CM = (
-    *((2.5, 5, 7.5, 10), (5, 7.5, 10, 12.5), (7.5, 10, 12.5, 15), (10, 12.5, 15, 20)),
-    *((12.5, 15, 20, 25), (15, 20, 25, 30)),
-)
-"""Sets of options [cm]: few, so that within each every length is right equally often."""
+_LADDERS: Sequence[Sequence[str]] = base.WORDS["distances"]
+"""Sets of options: few, so that within each every length is right equally often."""
 
 
 class DistanceMaker(StaticMaker):
@@ -222,8 +212,7 @@ class DistanceMaker(StaticMaker):
 
     def offer(self, _: Draft, right: str, rng: np.random.Generator) -> Sequence[str]:
         """Return one of the sets of four lengths that hold the right one."""
-        fours = [[f"{length:g} cm" for length in four] for four in _LADDERS_CM]
-        fitting = [four for four in fours if right in four]
+        fitting = [four for four in _LADDERS if right in four]
         return pick(rng, fitting) if fitting else ()
 
 
@@ -268,15 +257,9 @@ class DependencyMaker(StaticMaker):
 # RR
 
 _STEP_DEG, _LONGER = 15, 1.3
-AXIS_TURNS: tuple[str, ...] = tuple(base.WORDS["turns_about_axes"])
-"""Turns of a block that lies along the ground; their direction does not matter."""
-_OFFERED: Mapping[str, Sequence[str]] = {
-    "rr-angle": ("0 degrees", "30 degrees", "60 degrees", "90 degrees"),
-    "rr-turn": (
-        *("0 degrees", "90 degrees counterclockwise", "90 degrees clockwise", "180 degrees"),
-    ),
-    "rr-axis": AXIS_TURNS,
-}
+_OFFERED: Mapping[str, Sequence[str]] = base.WORDS["turns"]
+"""Turns by wording. Those about axes turn a block that lies along the ground, either way."""
+AXIS_TURNS = _OFFERED["rr-axis"]
 _SAME_ANGLE, _FREE_M, _ASIDE_M = 1e-4, 0.02, 0.01
 _COMPARED, _BESIDE = 6, 3
 
@@ -288,6 +271,7 @@ def _is_alike(block_type: BlockType, one_deg: Euler, other_deg: Euler) -> bool:
     return bool(np.abs(np.array(one) - np.array(other)).max() < _SAME_ANGLE)
 
 
+@functools.lru_cache(maxsize=4096)
 def images(stem: str, block: Block) -> Sequence[tuple[str, Euler]]:
     """Return phrases for the turns of a wording, each with the orientation that it gives the block.
     Raises UnfairError if the wording needs a long axis that the block does not have.
@@ -298,26 +282,20 @@ def images(stem: str, block: Block) -> Sequence[tuple[str, Euler]]:
         first, second = sorted(range(3), key=lambda axis: -sides[axis])[:2]
         if first == 2 or sides[first] < _LONGER * sides[second] or block.euler_deg[2] % 90:
             raise UnfairError("has no length that lies along the ground")
-        return _tipped(block.euler_deg, first)
+        rotation = euler_deg_to_matrix(block.euler_deg)
+        found = [(AXIS_TURNS[0], block.euler_deg)]
+        for name, axis in zip(AXIS_TURNS[1:], (2, first, 1 - first), strict=True):
+            for angle_deg in (90.0, -90.0):
+                x_deg, y_deg, z_deg = (angle_deg * (axis == one) for one in range(3))
+                quarter = euler_deg_to_matrix((x_deg, y_deg, z_deg))
+                found.append((name, angles_deg(quarter @ rotation)))
+        return found
     roll, pitch, yaw = block.euler_deg
     found = []
     for turn in range(0, 360, _STEP_DEG):
         side = "" if turn in (0, 180) else " counterclockwise" if turn < 180 else " clockwise"
         said = f"{min(turn, 360 - turn)} degrees{side if stem == 'rr-turn' else ''}"
         found.append((said, (roll, pitch, round((yaw + turn) % 360, 6))))
-    return found
-
-
-@functools.lru_cache(maxsize=4096)
-def _tipped(euler_deg: Euler, along: int) -> Sequence[tuple[str, Euler]]:
-    """Return each turn about an axis, in either direction, with the orientation it gives."""
-    rotation = euler_deg_to_matrix(euler_deg)
-    found = [(AXIS_TURNS[0], euler_deg)]
-    for name, axis in zip(AXIS_TURNS[1:], (2, along, 1 - along), strict=True):
-        for angle_deg in (90.0, -90.0):
-            roll, pitch, yaw = (angle_deg * (axis == one) for one in range(3))
-            turn = euler_deg_to_matrix((roll, pitch, yaw))
-            found.append((name, angles_deg(turn @ rotation)))
     return found
 
 

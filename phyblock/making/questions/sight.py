@@ -16,7 +16,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from phyblock.domain.blocks import COLORS, SHAPES, BlockType, Color, euler_deg_to_matrix
-from phyblock.domain.question import LETTERS, Question, QuestionPicture
+from phyblock.domain.question import QuestionPicture
 from phyblock.domain.scene import Block, Scene
 from phyblock.making.questions.base import (
     Draft,
@@ -186,6 +186,18 @@ def all_below(order: int, below: Below) -> set[int]:
     return found
 
 
+def lots_of(blocks: Sequence[Block]) -> list[list[Block]]:
+    """Return the blocks in lots, each connected by blocks that rest on each other. Blocks that only
+    touch side by side are in different lots: one may fall without the other.
+    """
+    lots: list[set[int]] = []
+    for order, below in support_graph(blocks).items():
+        lot = ({order} | below) - {GROUND}
+        lot = lot.union(*(other for other in lots if other & lot))
+        lots = [other for other in lots if not other & lot] + [lot]
+    return [[block for block in blocks if block.order in lot] for lot in lots]
+
+
 def require_supports_seen(picture: QuestionPicture, blocks: Sequence[Block]) -> None:
     """Raise UnfairError unless enough of all supports is visible to tell the blocks' heights."""
     below = support_graph(picture.blocks)
@@ -239,19 +251,6 @@ def are_told_apart(pictures: Sequence[QuestionPicture]) -> bool:
     )
 
 
-def picture_of(question: Question, label: str) -> QuestionPicture:
-    """Return the picture with a label. Raises UnfairError unless there is exactly one."""
-    found = [picture for picture in question.pictures if picture.label == label]
-    if len(found) != 1:
-        raise UnfairError(f"has {len(found)} pictures labeled {label}")
-    return found[0]
-
-
-def option_pictures(question: Question) -> list[QuestionPicture]:
-    """Return the pictures of the four options, in order."""
-    return [picture_of(question, letter) for letter in LETTERS]
-
-
 def marked(picture: QuestionPicture, letter: str) -> tuple[tuple[float, float, float], int]:
     """Return a mark's place [m], and the order of the block that is visible there.
 
@@ -265,29 +264,30 @@ def marked(picture: QuestionPicture, letter: str) -> tuple[tuple[float, float, f
     raise UnfairError(f"no block is marked {letter}")
 
 
-def with_lot(
-    picture: QuestionPicture, lot: Collection[int], colors: Sequence[Color]
-) -> QuestionPicture:
-    """Return the picture with the blocks of a lot in the first color, all others in the second."""
-    own = {order: colors[order not in lot] for order in orders_of(picture.blocks)}
-    return replace(picture, blocks=colored(picture.blocks, own))
-
-
 def highlighted(
-    picture: QuestionPicture, blocks: Collection[Block], slots: Slots, taken: int | None = None
-) -> frozenset[int]:
-    """Return orders of the blocks in the slots' `color`; all others are in their `other` color.
+    blocks: Sequence[Block], lot: Collection[int], slots: Slots, taken: int | None = None
+) -> tuple[Block, ...]:
+    """Return the blocks of a lot in the slots' `color`, all others in their `other` color.
 
-    The block that is `taken` has its own color. Raises UnfairError if a picture shows another
-    structure or other colors.
+    The block that is `taken` has its own color.
     """
-    color_of = {block.order: block.color for block in picture.blocks if block.order != taken}
-    lot = frozenset(order for order, color in color_of.items() if color == slots["color"])
     colors: dict[int, Color] = {}
-    for block in blocks:
-        role = "taken" if block.order == taken else "color" if block.order in lot else "other"
-        colors[block.order] = slots[role]  # type: ignore[assignment]
-    if set(colored([*blocks], colors)) != set(picture.blocks):
+    for order in orders_of(blocks):
+        role = "taken" if order == taken else "color" if order in lot else "other"
+        colors[order] = slots[role]  # type: ignore[assignment]
+    return colored(blocks, colors)
+
+
+def lot_of(
+    picture: QuestionPicture, blocks: Sequence[Block], slots: Slots, taken: int | None = None
+) -> frozenset[int]:
+    """Return the orders of the blocks that a picture highlights.
+
+    Raises UnfairError if it shows another structure or other colors.
+    """
+    mine = [block for block in picture.blocks if block.color == slots["color"]]
+    lot = frozenset(orders_of(mine)) - {taken}
+    if set(highlighted(blocks, lot, slots, taken)) != set(picture.blocks):
         message = "does not show the whole structure in the colors of the text"
         raise UnfairError(f"picture {picture.label} {message}")
     return lot

@@ -18,13 +18,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from phyblock.domain.blocks import COLORS, Color
-from phyblock.domain.question import LETTERS, Question, QuestionPicture, Subtask
+from phyblock.domain.question import LETTERS, QuestionPicture, Subtask
 from phyblock.domain.scene import Block, Scene
 from phyblock.domain.symmetry import turned_form
 from phyblock.making.questions import base, sight
-from phyblock.making.questions.base import Draft, Floats, Maker, UnfairError, View, pick
+from phyblock.making.questions.base import Draft, Maker, UnfairError, View, pick
 from phyblock.sim.question_pictures import is_inside, seen, shown_pixels
 
 # VP
@@ -55,14 +56,13 @@ class ViewpointMaker(Maker):
         side, front = pick(rng, tuple(_SIDES)), (pick(rng, _FRONTS_DEG), _FRONT_ELEVATION_DEG)
         yield from _colorings(scene, rng, "vp-side", front, _from_side(front, side), side)
 
-    def rederive(self, question: Question) -> tuple[int, ...]:
+    def answer(self, asked: Draft) -> tuple[int, ...]:
         """Compare the blocks in the pictures, from any side."""
-        slots = base.slots_of(question)
-        shown, options = sight.picture_of(question, "scene"), sight.option_pictures(question)
-        if question.wording == "vp-side":
+        shown, options = asked.picture, asked.drawn
+        if asked.wording == "vp-side":
             if shown.view_deg[0] not in _FRONTS_DEG:
                 raise UnfairError("the first picture is not straight from the front")
-            azimuth = _from_side(shown.view_deg, slots["side_words"])[0]
+            azimuth = _from_side(shown.view_deg, asked.slots["side_words"])[0]
             mine, *looks = ({(b.look, b.position_m) for b in p.blocks} for p in (shown, *options))
             sides = [option.view_deg[0] % 360 for option in options]
             pairs = zip(sides, looks, strict=True)
@@ -81,11 +81,11 @@ def _colorings(
     """Propose four colorings from the second view, one of which the first picture shows."""
     red = tuple(replace(block, color="red") for block in scene.blocks)
     plain = [QuestionPicture("scene", red, view) for view in (first, second)]
-    pixels = [shown_pixels(picture, seen(picture)) for picture in plain]
+    pixels = np.array([[*shown_pixels(one, seen(one)).values()] for one in plain])
     for _ in range(_FAMILIES_TRIED):
         scene = replace(scene, blocks=sight.recolored(scene, first, rng).blocks)
         four = [scene.blocks, *(_exchanged(scene.blocks, rng) for _ in LETTERS[1:])]
-        if _hits(four, *pixels) != 1 or min(_unlike(four, one) for one in pixels) < _LEAST_SHARE:
+        if not _are_compared(four, pixels):
             continue
         shown, options = ([QuestionPicture("scene", b, v) for b in four] for v in (first, second))
         is_new = len({turned_form(blocks) for blocks in four}) == len(four)
@@ -107,30 +107,21 @@ def _exchanged(blocks: Sequence[Block], rng: np.random.Generator) -> tuple[Block
     return sight.colored(blocks, colors)
 
 
-def _unlike(four: Sequence[Sequence[Block]], pixels: dict[int, int]) -> float:
-    """Return the smallest share of the visible blocks in which two colorings differ."""
-    differing = (
-        sum(pixels[a.order] for a, b in zip(one, other, strict=True) if a.color != b.color)
-        for one, other in itertools.combinations(four, 2)
-    )
-    return min(differing) / sum(pixels.values())
+def _are_compared(four: Sequence[Sequence[Block]], pixels: NDArray[np.int64]) -> bool:
+    """True if any two colorings differ in enough of the visible blocks, and comparing the visible
+    shares of colors, rounded to a thousandth, finds one of the four; ties count in part.
 
-
-def _hits(four: Sequence[Sequence[Block]], first: dict[int, int], second: dict[int, int]) -> float:
-    """Return the number of colorings found by comparing the visible shares of colors, rounded to a
-    thousandth; ties count in part.
+    `pixels` shows each block in both views, shape (2, blocks).
     """
-
-    def shares(pixels: dict[int, int]) -> Floats:
-        counts = [
-            [sum(pixels[b.order] for b in blocks if b.color == color) for color in COLORS]
-            for blocks in four
-        ]
-        return np.round(np.array(counts) / sum(pixels.values()), 3)
-
-    far = np.abs(shares(first)[:, None, :] - shares(second)[None, :, :]).sum(axis=2)
+    worn = np.array([[[b.color == one for one in COLORS] for b in blocks] for blocks in four])
+    every = pixels.sum(axis=1, keepdims=True)
+    differ = [(one != other).any(axis=1) for one, other in itertools.combinations(worn, 2)]
+    is_unlike = (pixels @ np.array(differ).T / every).min() >= _LEAST_SHARE
+    first, second = np.round(np.tensordot(pixels, worn, axes=(1, 1)) / every[:, None], 3)
+    far = np.abs(first[:, None, :] - second[None, :, :]).sum(axis=2)
     nearest = far <= far.min(axis=1, keepdims=True) + 1e-9
-    return round(float((np.diag(nearest) / nearest.sum(axis=1)).sum()), 6)
+    found = round(float((np.diag(nearest) / nearest.sum(axis=1)).sum()), 6)
+    return bool(is_unlike and found == 1)
 
 
 # OR
@@ -164,26 +155,26 @@ class OrderingMaker(Maker):
                 if _only_order(scene, stages) is None or _is_sorted_by_eye(plain, stages):
                     continue
                 kind, pair = pick(rng, ("or-build", "or-apart")), pick(rng, _PAIRS)
-                options = [sight.with_lot(plain, stage, pair) for stage in stages]
+                slots = dict(zip(("color", "other"), pair, strict=True))
+                lots = [sight.highlighted(scene.blocks, stage, slots) for stage in stages]
+                options = [replace(plain, blocks=blocks) for blocks in lots]
                 if sight.are_told_apart(options):
                     ordered = options if kind == "or-build" else options[::-1]
-                    slots: dict[str, str] = {"color": pair[0], "other": pair[1]}
                     facts = {"stages": [sorted(stage) for stage in stages]}
                     yield Draft(kind, scene, (), slots, ordered, facts=facts)
                     break
 
-    def rederive(self, question: Question) -> tuple[int, ...]:
+    def answer(self, asked: Draft) -> tuple[int, ...]:
         """Find the only order that the dependencies allow."""
-        slots, scene = base.slots_of(question), question.scene
-        options = sight.option_pictures(question)
-        stages = [sight.highlighted(one, scene.blocks, slots) for one in options]
+        scene, options = asked.scene, asked.drawn
+        stages = [sight.lot_of(one, scene.blocks, asked.slots) for one in options]
         if sorted(itertools.chain(*stages)) != sorted(b.order for b in scene.blocks):
             raise UnfairError("the stages do not hold every block once")
         sight.require_seen(options[0], sight.COUNTED)
         order = _only_order(scene, stages)
         if order is None:
             raise UnfairError("the dependencies allow more than one order, or none")
-        return order if question.wording == "or-build" else order[::-1]
+        return order if asked.wording == "or-build" else order[::-1]
 
 
 def _cut(scene: Scene, rng: np.random.Generator) -> Stages:
@@ -203,16 +194,13 @@ def _cut(scene: Scene, rng: np.random.Generator) -> Stages:
 def _only_order(scene: Scene, stages: Stages) -> tuple[int, ...] | None:
     """Return the places of the stages in their only possible order, or None."""
     stage_of = {order: place for place, stage in enumerate(stages) for order in stage}
-    before = {
-        (stage_of[below], stage_of[block.order])
-        for block in scene.blocks
-        for below in block.depend
-        if stage_of[below] != stage_of[block.order]
-    }
+    before: list[set[int]] = [set() for _ in stages]
+    for block in scene.blocks:
+        before[stage_of[block.order]] |= {stage_of[below] for below in block.depend}
     fitting = [
         order
         for order in itertools.permutations(range(len(stages)))
-        if all(order.index(early) < order.index(late) for early, late in before)
+        if all(before[stage] <= set(order[: i + 1]) for i, stage in enumerate(order))
     ]
     return fitting[0] if len(fitting) == 1 else None
 
