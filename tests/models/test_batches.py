@@ -37,11 +37,10 @@ from tests.servers.chassis import Running
 from tests.workspace import KEY
 
 SERVERS = {"direct": OpenAIBatches, "anthropic": AnthropicBatches, "gemini": GeminiBatches}
-PROTOCOLS = list(SERVERS)
 PRICE = {"input": 1000, "output": 1000, "batch": {"input": 500, "output": 500}}
 
 
-@pytest.fixture(params=PROTOCOLS)
+@pytest.fixture(params=SERVERS)
 def route(request):
     return request.param
 

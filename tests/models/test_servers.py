@@ -3,7 +3,7 @@
 import asyncio
 from collections import Counter
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import pytest
 from hypothesis import given, settings
@@ -32,10 +32,10 @@ REFUSED = RetryableError("connection refused", sent="no")
 class Outage:
     """A client whose server is away from `begins_s` until `ends_s`; calls take `takes_s`."""
 
-    time: FakeTime
     begins_s: float
     ends_s: float
     takes_s: float
+    time: FakeTime = field(default_factory=FakeTime)
     failed: int = 0
     answered: int = 0
 
@@ -56,24 +56,18 @@ class Outage:
         pass
 
 
-def ask_through(client, time, *, samples, width, was_heard=False):
+def ask_through(client, *, samples, width, was_heard=False):
     """Ask as a run does, `width` samples at once, a stopped model no more."""
     found = []
 
     async def main():
-        policy = RetryPolicy(clock=time.clock)
+        policy = RetryPolicy(clock=client.time.clock)
         server = Server("http://gone:1", client, was_heard=was_heard)
         servers = Servers((server,), policy, lambda _: None)
         config = ROUTES["direct"].config("http://gone:1", max_concurrency=width)
         limits = Limits(config, asyncio.Semaphore(width), servers)
-        model = ChatModel(
-            config=config,
-            servers=servers,
-            limits=limits,
-            budget=ModelBudget(Budget()),
-            policy=policy,
-            report=lambda _: None,
-        )
+        parts = {"servers": servers, "limits": limits, "budget": ModelBudget(Budget())}
+        model = ChatModel(config=config, policy=policy, report=lambda _: None, **parts)
         queue = requests_of(samples)
 
         async def work():
@@ -86,7 +80,7 @@ def ask_through(client, time, *, samples, width, was_heard=False):
                     if isinstance(error, UnavailableError):
                         queue.clear()
 
-        await time.run_until_done(*(asyncio.create_task(work()) for _ in range(width)))
+        await client.time.run_until_done(*(asyncio.create_task(work()) for _ in range(width)))
 
     asyncio.run(main())
     return found
@@ -95,9 +89,8 @@ def ask_through(client, time, *, samples, width, was_heard=False):
 @settings(max_examples=40)
 @given(st.floats(0, 30), st.floats(1, 280), st.floats(0.1, 20), st.integers(1, 12))
 def test_an_outage_loses_nothing(begins_s, lasts_s, takes_s, width):
-    time = FakeTime()
-    client = Outage(time, begins_s, begins_s + lasts_s, takes_s)
-    answers = ask_through(client, time, samples=40, width=width, was_heard=True)
+    client = Outage(begins_s, begins_s + lasts_s, takes_s)
+    answers = ask_through(client, samples=40, width=width, was_heard=True)
     assert [type(answer) for answer in answers] == [Reply] * 40
     assert client.answered == 40
     # All that are under way, each twice, then single ones at growing distances.
@@ -106,27 +99,25 @@ def test_an_outage_loses_nothing(begins_s, lasts_s, takes_s, width):
 
 @pytest.mark.parametrize("width", [2, 8, 32])
 def test_a_wrong_address_stops_the_model_after_few_attempts_and_leaves_its_samples(width):
-    time = FakeTime()
-    client = Outage(time, 0.0, float("inf"), 1.0)
-    answers = ask_through(client, time, samples=500, width=width)
+    client = Outage(0.0, float("inf"), 1.0)
+    answers = ask_through(client, samples=500, width=width)
     assert {type(answer) for answer in answers} == {UnavailableError}
     assert len(answers) == width
     assert "http://gone:1 could not be reached for" in str(answers[0])
     assert str(REFUSED) in str(answers[0])
     assert client.failed <= width * MOST_CONNECTION_FAILURES
-    assert 18 <= time.now_s < 300
+    assert 18 <= client.time.now_s < 300
 
 
 @settings(max_examples=20)
 @given(st.floats(30, 60), st.integers(2, 12))
 def test_a_server_that_has_answered_is_tried_for_as_long_as_the_policy_says(begins_s, width):
-    time = FakeTime()
-    client = Outage(time, begins_s, float("inf"), 5.0)
-    answers = ask_through(client, time, samples=500, width=width)
+    client = Outage(begins_s, float("inf"), 5.0)
+    answers = ask_through(client, samples=500, width=width)
     replies = [answer for answer in answers if isinstance(answer, Reply)]
     assert len(replies) == client.answered > 0
     assert "http://gone:1 could not be reached for 3" in str(answers[-1])
-    assert begins_s + 290 <= time.now_s < begins_s + 420
+    assert begins_s + 290 <= client.time.now_s < begins_s + 420
 
 
 def servers_of(count, policy=None):
