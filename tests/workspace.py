@@ -196,8 +196,14 @@ class Workspace:
 
     def write_models(self, url: str, *names: str, **fields: Any) -> Path:
         """`models.yaml`: each name is a model of the local server at `url`."""
-        entry = {"api_base": f"{url}/v1", **fields}
-        entries = {name: {"id": f"hosted_vllm/{name}", **entry} for name in names}
+        return self.write_served(dict.fromkeys(names, url), **fields)
+
+    def write_served(self, urls: Mapping[str, str], **fields: Any) -> Path:
+        """`models.yaml`: each is a model of a local server."""
+        entries = {
+            name: {"id": f"hosted_vllm/{name}", "api_base": f"{url}/v1", **fields}
+            for name, url in urls.items()
+        }
         return self.write_yaml("models.yaml", entries)
 
     def write_yaml(self, name: str, content: object) -> Path:

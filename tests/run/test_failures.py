@@ -40,8 +40,7 @@ def test_a_model_that_cannot_answer_is_stopped_alone(workspace):
     servers = [OpenAIChat(Faults(mode=mode)) for mode in ("401", "404", "ok")]
     with Running(servers[0]) as locked, Running(servers[1]) as unknown, Running(servers[2]) as fine:
         urls = {"locked": locked.url, "unknown": unknown.url, "fine": fine.url}
-        served = {n: {"id": f"hosted_vllm/{n}", "api_base": f"{u}/v1"} for n, u in urls.items()}
-        workspace.write_yaml("models.yaml", served)
+        workspace.write_served(urls)
         workspace.write_suite(models=list(urls), seeds=list(range(20)))
         done = workspace.run("--set", "limits.max_concurrency=6")
         assert (done.code, done.err) == (1, "")
