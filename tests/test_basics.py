@@ -6,6 +6,8 @@ import math
 import operator
 import os
 import signal
+import subprocess
+import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -185,9 +187,50 @@ def test_a_batch_that_could_not_be_started_can_be_computed_by_another_shard(tmp_
     assert "0000-000000.pickle" in str(kept.value)
 
 
+@pytest.mark.slow
+@pytest.mark.filterwarnings("ignore")
+def test_a_killed_worker_of_a_cluster_loses_and_doubles_nothing(tmp_path):
+    pytest.importorskip("ray", reason="Ray is not installed: pip install 'phyblock[ray]'")
+    with open_workers(2, "local") as workers:
+        assert list(workers.map(partial(killed_once, tmp_path), range(40))) == list(range(40))
+        assert list(workers.map(late, range(150))) == SQUARES
+
+
 def killed_once(marks, number):
     """Return the number, but kill the process of the first call with 37."""
     if number == 37 and not list(marks.iterdir()):
         (marks / "37").touch()
         os.kill(os.getpid(), signal.SIGKILL)
     return number
+
+
+@pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGKILL])
+def test_workers_end_with_the_process_that_started_them(sent, tmp_path):
+    (tmp_path / "work.py").write_text(WORK, encoding="utf-8")
+    words = [sys.executable, str(tmp_path / "work.py")]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "start_new_session": True}
+    with subprocess.Popen(words, **pipes) as process:
+        assert int(process.stdout.readline()) != int(process.stdout.readline())
+        # Ctrl-C reaches the whole group, a kill one process alone.
+        (os.killpg if sent == signal.SIGINT else os.kill)(process.pid, sent)
+        # The workers hold the pipe open: it ends when they have.
+        _, errors = process.communicate(timeout=30)
+    assert process.returncode == (130 if sent == signal.SIGINT else -signal.SIGKILL)
+    assert b"Traceback" not in errors
+
+
+WORK = """
+import os, sys, time
+from phyblock.workers import open_workers
+
+def stay(n):
+    os.write(1, f"{os.getpid()}\\n".encode())
+    time.sleep(60)
+
+if __name__ == "__main__":
+    try:
+        with open_workers(2) as workers:
+            list(workers.map(stay, range(2)))
+    except KeyboardInterrupt:
+        sys.exit(130)
+"""

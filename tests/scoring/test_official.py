@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from phyblock.data.scenes import read_builtin
+from phyblock.domain.question import CATEGORIES
 from phyblock.domain.scene import Plan
 from phyblock.parsing.plan import parse_plan
+from phyblock.results.paper import published_table
 from phyblock.scoring.plan import AssemblyScorer, Goal, chance, match_plan
 from phyblock.scoring.steps import Assembly, gated
 from phyblock.types import GATINGS, SETTINGS
@@ -69,6 +71,30 @@ def test_valid_orders_score_1_and_none_of_their_moves_fails(source, every, reque
                 outcomes = {assembly.move(numbers[vertex]).outcome for vertex in order}
                 assert outcomes == {"placed"}, (scene.id, setting, gating, order)
                 assert assembly.is_complete
+
+
+ROUNDING = 0.05 + 1e-9
+OTHERWISE_AVERAGED = {
+    "Claude-3.7 Sonnet": 53.65,
+    "Gemini-1.5-flash": 53.75,
+    "Qwen-VL-Max": 51.45,
+    "Qwen2.5-VL-72B-Instruct": 46.825,
+    "Random": 23.90,
+}
+"""Rows whose printed overall number is not the mean of the printed categories, and that mean."""
+
+
+def test_published_means_are_those_of_their_parts_but_the_overall_of_five_rows():
+    others = {}
+    for model, rows in published_table(2).groupby("model"):
+        cells = {(row.category, row.subtask): row.value for row in rows.itertuples()}
+        for category, subtasks in CATEGORIES.items():
+            mean = sum(cells[category, subtask] for subtask in subtasks) / len(subtasks)
+            assert abs(mean - cells[category, "average"]) <= ROUNDING, (model, category)
+        mean = sum(cells[category, "average"] for category in CATEGORIES) / len(CATEGORIES)
+        if abs(mean - cells["overall", "average"]) > ROUNDING:
+            others[model] = mean
+    assert others == pytest.approx(OTHERWISE_AVERAGED)
 
 
 def test_chance_of_an_order_is_one_in_all_permutations():

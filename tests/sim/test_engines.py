@@ -149,6 +149,16 @@ def test_a_step_stands_falls_or_is_refused(engine):
         assert [len(world) for world in done.worlds] == list(accumulate(is_put))
 
 
+def test_small_overlaps_give_way_and_a_tower_is_reached(engine):
+    done = execute([FIRST, DEEP, SLIGHT], engine=engine)
+    assert done.steps[1].overlap_cm == pytest.approx(2, abs=0.01)
+    assert done.steps[2].overlap_cm == pytest.approx(0.4, abs=0.05)
+    assert done.blocks[1].position_m[0] == pytest.approx(0.05, abs=0.001)
+    done = execute(tower(3), engine=engine)
+    assert voxel_iou(tower(3), done.blocks) == 1
+    assert blocks_reached(tower(3), done.blocks, 1, 10) == 3
+
+
 def test_who_is_knocked_over_is_named_and_stays_so(engine):
     beam = counterweighted_beam()
     done = execute([*beam[:3], None, beam[0]], engine=engine)
