@@ -142,6 +142,17 @@ def test_a_batch_that_is_ended_keeps_its_answers_and_the_rest_is_asked_again(rou
     assert [len(made.requests) for made in server.made] == [4, len(places)]
 
 
+def test_a_refused_batch_stops_the_model_and_asks_nothing(disk):
+    requests = requests_of(2)
+    with serving("direct", BatchFaults(ends={0: "refused"})) as (server, config):
+        ended = run_command(config, disk, requests, budget=Budget(1e9))
+        assert isinstance(ended[0], UnavailableError)
+        assert "Enqueued token limit" in str(ended[0])
+        assert disk.lines[-1].event == "lost"
+        assert len(texts(run_command(config, disk, requests))) == 2
+    assert once(server, 2)
+
+
 STOPS = UnavailableError
 CALLS = {
     "a look fails": ({"look": ("500", "reset", "503")}, Reply),

@@ -25,6 +25,7 @@ from phyblock.errors import (
     UnavailableError,
 )
 from phyblock.models import client
+from phyblock.models.client import shown
 from phyblock.models.model import RetryPolicy
 from phyblock.models.request import Image, Message, json_body, wire_messages
 from phyblock.parsing.answer import choice_form
@@ -335,6 +336,13 @@ def test_a_server_that_never_answers_is_a_timeout(wire, route):
     assert isinstance(answer, RetryableError)
     assert answer.status is None
     assert server.requests == policy.attempts
+
+
+def test_keys_leave_an_error_before_it_is_cut():
+    for length in range(440, 520):
+        text = shown(f"{'x' * length}{KEY} and more", (KEY,))
+        assert len(text) <= 500
+        assert KEY[:4] not in text
 
 
 # Every named fault of a server.

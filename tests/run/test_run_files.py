@@ -1,6 +1,7 @@
 """The files of a run folder: appended whole, read whole, each prompt once."""
 
 import errno
+import hashlib
 import json
 import os
 from contextlib import closing
@@ -12,10 +13,11 @@ from hypothesis import strategies as st
 
 from phyblock.config.suite import load_suite
 from phyblock.errors import StoreError
-from phyblock.records.files import BatchLines, CallLines, PromptLines, RecordLines
+from phyblock.records.files import BatchLines, CallLines, PromptLines, RecordLines, read_prompts
 from phyblock.records.record import Call, Reply
 from phyblock.run.plan import make_plan
 from phyblock.run.store import AppendFile, Progress, RunStore
+from tests.servers.openai_chat import OpenAIChat
 
 values = st.dictionaries(st.text(max_size=5), st.text(max_size=5) | st.integers(), max_size=4)
 
@@ -131,6 +133,18 @@ def test_a_limit_counts_every_call_once_and_one_without_an_end_in_full(calls):
     assert len(progress.unanswered) == unanswered
     assert progress.unanswered_text.startswith(f"{unanswered} call" if unanswered else "")
     assert progress.limit_usd == expected
+
+
+def test_every_record_names_a_prompt_that_is_there(workspace):
+    with workspace.served(OpenAIChat(), models=["alpha", "oracle"]):
+        workspace.completed()
+    prompts = read_prompts(workspace.out)
+    sent = {record["prompt"]["messages"] for record in workspace.records() if record["prompt"]}
+    assert sent == set(prompts) != set()
+    for digest, messages in prompts.items():
+        fields = [message.fields() for message in messages]
+        canonical = json.dumps(fields, sort_keys=True, separators=(",", ":"))
+        assert hashlib.sha256(canonical.encode()).hexdigest() == digest
 
 
 def test_tables_and_page_are_made_again_where_records_are_newer_or_they_are_not_there(workspace):
