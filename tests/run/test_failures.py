@@ -1,7 +1,12 @@
 """Failures of a provider and of the reply cache: retried, recorded by kind, said once."""
 
+import contextlib
+import re
+import signal
 import sqlite3
+import time
 from collections import Counter
+from pathlib import Path
 
 import pytest
 
@@ -131,3 +136,39 @@ def test_a_disk_that_takes_neither_replies_nor_records_ends_the_run_after_few_ca
         workspace.completed()
         assert server.requests <= asked + SAMPLES - kept
         assert len({record["sample"] for record in workspace.records()}) == SAMPLES
+
+
+@contextlib.contextmanager
+def locked(workspace):
+    """Hold the reply cache as another process would."""
+    path = workspace.cache / "replies.sqlite"
+    ReplyCache(path).close()
+    with contextlib.closing(sqlite3.connect(path, isolation_level=None)) as db:
+        db.execute("BEGIN IMMEDIATE")
+        yield
+
+
+def test_ctrl_c_ends_a_run_whose_cache_is_locked(workspace):
+    with prepare(workspace, OpenAIChat(), AT_ONCE), locked(workspace), workspace.start() as process:
+        while not catches(process.pid, signal.SIGTERM):
+            time.sleep(0.01)
+        time.sleep(1.0)
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=60)
+    assert (process.returncode, err) == (130, "")
+    assert "(interrupted)" in out
+
+
+@pytest.mark.slow
+def test_a_run_with_a_locked_cache_ends_as_without_one(workspace):
+    with prepare(workspace, OpenAIChat(), AT_ONCE) as server, locked(workspace):
+        done = workspace.completed()
+        assert done.out.count("database is locked") == 1
+        assert server.requests == SAMPLES
+
+
+def catches(pid, number):
+    """True if a process has its own handler of a signal, as one that asks models has of SIGTERM."""
+    status = Path(f"/proc/{pid}/status").read_text(encoding="utf-8")
+    (mask,) = re.findall(r"^SigCgt:\s*(\w+)", status, re.MULTILINE)
+    return bool(int(mask, 16) >> (number - 1) & 1)

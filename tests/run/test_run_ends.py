@@ -37,6 +37,11 @@ SAMPLES = 20
 AT_ONCE = 4
 
 
+def ended(process):
+    out, err = process.communicate(timeout=60)
+    return process.returncode, out, err
+
+
 def wait_for(condition):
     for _ in range(3000):
         if condition():
@@ -60,8 +65,8 @@ def test_calls_under_way_are_waited_for_and_those_that_wait_for_their_turn_are_n
         process.send_signal(name)
         assert f"waiting for {AT_ONCE} calls in progress" in process.stdout.readline()
         server.holds = False
-        out, err = process.communicate(timeout=60)
-        assert (process.returncode, err) == (130, "")
+        code, out, err = ended(process)
+        assert (code, err) == (130, "")
         assert f"{AT_ONCE} of {2 * SAMPLES} samples are done (interrupted)" in out
         assert f"phyblock run suite.yaml --out {workspace.out}" in out
         assert server.requests == AT_ONCE
@@ -75,6 +80,21 @@ def test_calls_under_way_are_waited_for_and_those_that_wait_for_their_turn_are_n
         workspace.completed()
         assert server.requests == 2 * SAMPLES
         assert workspace.files() == before
+
+
+def test_a_second_interrupt_ends_at_once(workspace):
+    with prepare(workspace, OpenAIChat(Faults(mode="slow"))) as server:
+        process = workspace.start()
+        wait_for(lambda: server.at_once == AT_ONCE)
+        process.send_signal(signal.SIGINT)
+        said = process.stdout.readline()
+        assert "Ctrl-C again" in said
+        process.send_signal(signal.SIGINT)
+        code, out, err = ended(process)
+    assert (code, err) == (130, "")
+    assert f"0 of {SAMPLES} samples are done (interrupted)" in out
+    assert "run the same command again" in out
+    assert not workspace.records()
 
 
 PROGRAM = """
@@ -314,3 +334,23 @@ def test_work_of_a_worker_that_was_killed_is_done_again_once(tmp_path):
         asyncio.run(work())
     finally:
         shop.close()
+
+
+NOWHERE = "http://127.0.0.1:9"
+
+
+@pytest.mark.parametrize("words", ["HTTP 429", "no connection to 127.0.0.1:9"])
+def test_a_wait_for_another_attempt_or_for_a_server_is_given_up(workspace, words):
+    with prepare(workspace, OpenAIChat(Faults(mode="429", retry_after="100"))) as server:
+        if "429" not in words:
+            workspace.write_models(NOWHERE, "alpha")
+        process = workspace.start()
+        while words not in process.stdout.readline():
+            assert process.poll() is None
+        wait_for(lambda: not server.at_once)
+        process.send_signal(signal.SIGINT)
+        code, out, err = ended(process)
+    assert (code, err) == (130, "")
+    assert f"0 of {SAMPLES} samples are done (interrupted)" in out
+    assert not workspace.records()
+    assert server.requests <= AT_ONCE

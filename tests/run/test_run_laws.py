@@ -2,11 +2,16 @@
 
 import random
 import shutil
+import subprocess
+import sys
+import threading
 import time
+from pathlib import Path
 
 import pytest
 import yaml
 
+import phyblock
 from phyblock.data.base import VERSION_FILE, read_version
 from phyblock.errors import DataError, SpecError
 from phyblock.records.files import read_manifest
@@ -16,6 +21,7 @@ from phyblock.results.load import load_run
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.web.factory import manifest, run_of
+from tests.workspace import call
 
 SCORED = ("estimates.csv", "errors.csv", "errors.tex", "table1.csv", "table1.tex")
 
@@ -214,3 +220,55 @@ def test_scores_can_be_made_where_the_data_set_has_moved(copy):
     manifest.write_text(lost, encoding="utf-8")
     assert copy.phyblock("score", "out", "--jobs", "1").code == 2
     copy.does("score", "out", "--jobs", "1", "--data", "moved")
+
+
+# The path of one sample: the modules that it goes through, and those it imports.
+
+ROOT = Path(phyblock.__file__).parent
+MOST_ENTERED = 20
+MOST_IMPORTED = 100
+
+IMPORTED = (
+    "import atexit, sys\n"
+    "from phyblock.cli.main import main\n"
+    "names = lambda: [name for name in sys.modules if name.partition('.')[0] == 'phyblock']\n"
+    "atexit.register(lambda: print('modules', *names(), file=sys.stderr))\n"
+    "main()\n"
+)
+
+
+def test_one_sample_goes_through_few_modules(inside):
+    """From the arrival of the second request to that of the third: the end of one sample and the
+    beginning of the next, in every thread.
+    """
+    inside.write_suite(models=["alpha"], levels=[2, 3], settings=["A"])
+    entered = set()
+
+    def profile(frame, event, _):
+        if event == "call" and len(server.seen) == 2:
+            entered.add(frame.f_code.co_filename)
+
+    with Running(server := OpenAIChat()) as running:
+        inside.write_models(running.url, "alpha", max_concurrency=1)
+        threading.setprofile(profile)
+        sys.setprofile(profile)
+        try:
+            call("run", "suite.yaml", "--out", "out")
+        finally:
+            sys.setprofile(None)
+            threading.setprofile(None)
+    assert server.requests == 4
+    modules = {Path(name).relative_to(ROOT) for name in entered if name.startswith(str(ROOT))}
+    assert Path("models/model.py") in modules
+    assert len(modules) <= MOST_ENTERED, " ".join(sorted(map(str, modules)))
+
+
+def test_one_sample_of_a_baseline_imports_few_modules(workspace):
+    workspace.write_suite(models=["random"], levels=[2], settings=["A"])
+    command = [sys.executable, "-c", IMPORTED, "run", "suite.yaml", "--limit", "1", "--out", "out"]
+    done = subprocess.run(
+        command, cwd=workspace.root, env=workspace.env, capture_output=True, text=True, check=True
+    )
+    modules = done.stderr.rpartition("modules ")[2].split()
+    assert "phyblock.tracks.full_planning" in modules
+    assert len(modules) <= MOST_IMPORTED, sorted(modules)
