@@ -37,12 +37,12 @@ _FAILURES = 4
 @click.command()
 @run_argument
 @click.option("--print", "prints", is_flag=True, help="Print all tables; write nothing.")
-@click.option("--only", "names", multiple=True, metavar="NAME", help="With --print: this table.")
+@click.option("--only", "names", multiple=True, metavar="NAME", help="Print only this table.")
 @click.option(
     *("--format", "form"),
     type=click.Choice(["text", "md", "tex"]),
     default="text",
-    help="With --print: how.",
+    help="Form of printed tables.",
 )
 @data_option
 def report(run: Path, prints: bool, names: tuple[str, ...], form: str, data: Path | None) -> None:
@@ -52,7 +52,7 @@ def report(run: Path, prints: bool, names: tuple[str, ...], form: str, data: Pat
     available.
     """
     console = make_console()
-    if not prints:
+    if not (prints or names or form != "text"):
         print_path(console, show_tables(run, data))
         return
     from phyblock.results.load import load_run

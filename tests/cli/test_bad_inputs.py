@@ -235,7 +235,7 @@ FOLDERS = (
     Bad("export-form", command("export", "out", "--to", "vlmevalkit"), ("is not one of csv, hf",)),
     Bad("figure", command("figures", "out", "--only", "radar"), ("no such figure",)),
     Bad("width", command("figures", "out", "--width", "20"), ("Invalid value",)),
-    Bad("table", command("report", "out", "--print", "--only", "table9"), ("no such table",)),
+    Bad("table", command("report", "out", "--only", "table9"), ("no such table",)),
     Bad("compare-track", command("compare", "out", "--track", "vqa"), ("no such track",)),
     Bad("compare-model", command("compare", "out", "--models", "alpha,delta"), ("no such model",)),
     Bad("compare-twice", command("compare", "out", "--models", "alpha,alpha"), ("a model twice",)),
