@@ -132,7 +132,7 @@ def run(
         if not is_asked:
             found = ", ".join(row.model.name for row in rows if row.may_cost)
             message = "would cost money, and there is no terminal to ask on"
-            hint = "agree with --yes, or set a limit: --set limits.max_cost_usd=5"
+            hint = "agree with --yes, or give prices and set a limit: --set limits.max_cost_usd=5"
             raise SpecError(Problem("models", message, found=found, hint=hint))
         if not click.confirm("Continue?", default=False):
             console.print("Nothing was asked.")

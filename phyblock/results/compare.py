@@ -24,7 +24,7 @@ from phyblock.results.estimates import (
     track_notes,
 )
 from phyblock.results.load import Design, Run, checked_models, track_measures
-from phyblock.results.text import NO_VALUE, Column, Row, TextTable, level_name, number, to_csv
+from phyblock.results.text import NO_VALUE, Column, TextTable, level_name, number, to_csv
 from phyblock.scoring import statistics
 from phyblock.scoring.plan import Floats
 from phyblock.text import counted
@@ -33,6 +33,8 @@ from phyblock.tracks.measures import SCORED_BY, Cell, Measure, in_unit
 
 _LEVEL = 1 - statistics.CONFIDENCE
 _KEYS = ["scene", "item", "seed", "variant"]
+_NOT_ASKED = ("name", "description", "models", "baselines", "seeds", "limit", "levels", "tracks",
+              "dataset", "vary")  # fmt: skip
 _JOINT = ("p_holm", "verdict", "detectable_holm")
 """Columns of `Comparison.table` that depend on all of its tests."""
 
@@ -263,12 +265,11 @@ class Comparison:
 
     `table` has one row per pair and part of the track (level, category of questions): a, b, part,
     value_a, value_b, difference (a minus b), se, lo, hi [all in `unit`], p, p_holm (corrected for
-    all rows), verdict, detectable_holm (the difference that is found in four of five cases at the
-    first step of Holm's correction) [in `unit`; NaN where that exceeds the most that values can
-    differ by], better, worse and same (samples on which a has the
-    better, worse, same value), n_samples, n_scenes, n_clusters. `ranks`, if all pairs of a run were
-    compared, has one row per ranked model: model, value, best and worst rank. `name` and `unit` are
-    those of the values, `how` describes them.
+    all rows), verdict, detectable_holm (the difference that is found in four of five cases at
+    the first step of Holm's correction) [in `unit`; NaN beyond the most that values can differ
+    by], better, worse and same (samples on which a is better, worse, the same), n_samples,
+    n_scenes, n_clusters. `ranks`, if all pairs of a run were compared, has one row per ranked
+    model: model, value, best and worst rank. `name`, `unit` and `how` are those of the values.
     """
 
     table: pd.DataFrame
@@ -365,10 +366,13 @@ def compare_pairs(
     table["verdict"] = [_verdict(row, measure, n_tests) for row in table.to_dict("records")]
     level, spread = _LEVEL / max(n_tests, 1), (table["se"], table["n_clusters"])
     table["detectable_holm"] = statistics.detectable(*spread, level, measure.most_apart)
-    how = [what.how]
-    for run in runs:
-        if words := run.presentation(what.track):
-            how.append(f"Run {run.path.name}: {', '.join(words)}.")
+    said = [pd.json_normalize(run.manifest.suite).iloc[0] for run in runs]
+    names = [name for name in said[0].index if not name.startswith(_NOT_ASKED)]
+    both = [(name, said[0][name], said[-1].get(name)) for name in names]
+    differ = ", ".join(f"{name} ({a}, {b})" for name, a, b in both if a != b)
+    how = [what.how, *([f"The runs differ in {differ}."] if differ else [])]
+    how += [f"Run {run.path.name}: {', '.join(words)}."
+            for run in runs if (words := run.presentation(what.track))]  # fmt: skip
     ranks = _ranks(table, measure, ranked)
     return Comparison(table, ranks, measure.heading, measure.unit, " ".join(how))
 
@@ -445,15 +449,12 @@ def compare_view(found: Comparison) -> TextTable:
     if found.table["part"].nunique() > 1:
         columns.append(Column("Part", "", True, lambda row: level_name(row["part"])))
 
-    def p_text(row: Row) -> str:
-        return "< 0.001" if row["p_holm"] < 0.001 else number(row["p_holm"], 3)
-
     columns += [
         *(Column.value("value_a", "A", group), Column.value("value_b", "B", group)),
         Column.value("difference", "A - B", group, signed=True),
         Column.interval(group, signed=True),
         Column.value("detectable_holm", "finds", group),
-        Column("p (Holm)", show=p_text),
+        Column("p (Holm)", show=lambda row: number(row["p_holm"], 3).replace("0.000", "< 0.001")),
         Column.text("verdict", "Verdict"),
         Column.whole("better", "A better", "Samples"),
         Column.whole("worse", "B better", "Samples"),

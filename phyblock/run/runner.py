@@ -281,7 +281,10 @@ class Session:
                 most = _LOCAL_AT_ONCE
             # All requests of a batch are asked at once.
             count = len(queue) if planned.batch else min(most, len(queue))
-            workers += [asyncio.create_task(self._work(planned.name)) for _ in range(count)]
+            # Batches of a model that is stopped are waited for: only other tasks have its name.
+            name = "" if planned.batch else planned.name
+            work = (self._work(planned.name) for _ in range(count))
+            workers += [asyncio.create_task(one, name=name) for one in work]
         try:
             # One worker's error must not end the others, whose calls are paid for.
             ended = await asyncio.gather(*workers, return_exceptions=True)
@@ -317,6 +320,10 @@ class Session:
                 if model not in self.result.stopped:
                     self.result.stopped[model] = str(error)
                     self.watch(ModelEvent(model, "stopped", str(error)))
+                    for task in self._waiting:
+                        # It may wait for another attempt, which would fail too.
+                        if task.get_name() == model:
+                            task.cancel()
             except BudgetReachedError as error:
                 self._stop(Stopping("cost", str(error)))
             except HaltedError:
@@ -353,7 +360,7 @@ class Session:
         try:
             return await work
         except asyncio.CancelledError:
-            if self.result.stop is not None:
+            if self.result.stop is not None or task.get_name() in self.result.stopped:
                 raise HaltedError(message) from None
             raise
         finally:

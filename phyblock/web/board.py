@@ -120,8 +120,9 @@ class SiteRun:
 def entries_of(runs: Sequence[SiteRun]) -> tuple[Entry, ...]:
     """Return every model of every run.
 
-    The same model with the same parameters, asked by two runs in different tracks, is one row. If
-    runs asked it in the same track, it has a row for each, with the time and identity of the run.
+    The same model with the same parameters, asked by two runs in different tracks, is one row, and
+    so is a baseline with the same result in several runs. Any other model that runs asked in the
+    same track has a row for each, with the time and identity of the run.
     """
     found: list[tuple[dict[str, Any], Entry]] = []
     for number, one in enumerate(runs):
@@ -129,12 +130,14 @@ def entries_of(runs: Sequence[SiteRun]) -> tuple[Entry, ...]:
         for model in portable_manifest(one.run.manifest).models:
             fields = {name: value for name, value in model.fields().items() if name not in _LABELS}
             for known, entry in found:
-                if known == fields and not set(one.tracks) & set(entry.runs):
+                sides = [(one, runs[n], t) for t, n in entry.runs.items() if t in one.tracks]
+                found_by = [[r.values[t].samples.get(model.name) for r in of] for *of, t in sides]
+                if known == fields and all(model.is_baseline and a == b for a, b in found_by):
                     break
             else:
                 entry = Entry(model)
                 found.append((fields, entry))
-            entry.runs |= dict.fromkeys(one.tracks, number)
+            entry.runs = {**dict.fromkeys(one.tracks, number), **entry.runs}
     entries = tuple(entry for _, entry in found)
     names = [entry.model.name for entry in entries]
     for entry in entries:
@@ -238,6 +241,7 @@ def board_of(runs: Sequence[SiteRun], entries: Sequence[Entry]) -> dict[str, Any
         rows.append(
             {
                 "name": entry.name,
+                "model": name,
                 "kind": entry.model.kind,
                 "size_b": entry.model.size_b,
                 "runs": entry.runs,

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel
-
 from phyblock.bundle import opened_bundle
+from phyblock.config.yaml import shown
 from phyblock.errors import DataError, Problem, SpecError
 from phyblock.files import OutFolder, digest_of_file
 from phyblock.records.files import MANIFEST, RECORDS
@@ -35,9 +34,7 @@ _ABOUT = (
 
 @dataclass
 class SiteWritten:
-    """A written site: its page, numbers of models (with baselines) and samples, and the reason why
-    it draws nothing, or "".
-    """
+    """A site: its page, numbers of models (with baselines) and samples, why nothing is drawn."""
 
     path: Path
     models: int
@@ -124,8 +121,7 @@ def open_runs(paths: Sequence[Path], data: Sequence[Path], kept: ExitStack) -> t
 
 
 def check_runs(runs: Sequence[SiteRun]) -> None:
-    """Raise SpecError naming all differences between a run and an earlier one that keep them from
-    sharing a table.
+    """Raise SpecError naming all that keeps a run from sharing a table with an earlier one.
 
     All runs must use one version of one data set. Runs that share a track must agree in its items,
     prompt, pictures (in any size) and counts.
@@ -177,12 +173,9 @@ def _facts(run: Run, shared: Sequence[str]) -> dict[str, Any]:
             # Digests of pictures change with their size.
             if key != "pictures":
                 found[f"tracks.{track}.{key}"] = value
-        held: dict[str, BaseModel] = {}
-        if identity.get("pictures") is not None:
-            held["images"] = suite.images
-        if kind.options is not None:
-            held[kind.section] = suite.section(kind.options)
-        for name, values in held.items():
+        drawn = [("images", suite.images)] if identity.get("pictures") is not None else []
+        own = [(kind.section, suite.section(kind.options))] if kind.options is not None else []
+        for name, values in (*drawn, *own):
             for key in type(values).model_fields.keys() - _CONTROLS:
-                found[f"{name}.{key}"] = str(getattr(values, key))
+                found[f"{name}.{key}"] = shown(getattr(values, key))
     return found

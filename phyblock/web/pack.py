@@ -171,7 +171,9 @@ def pack_samples(
                 messages = [message.fields() for message in line.messages]
                 prompts[line.sha256] = packs["prompts"].add(messages)
         order = {"track": design.suite.tracks, "model": design.model_names}
-        held = one.run.records[one.run.records["track"].isin(design.suite.tracks)]
+        held = one.run.records
+        owned = [(number, *by) in owner for by in zip(held["track"], held["model"], strict=True)]
+        held = held.loc[owned]
         held = held.assign(**{name: held[name].map(known.index) for name, known in order.items()})
         held = held.sort_values(["track", "item", "model", "seed"], kind="stable")
         for record in RecordLines(one.run.path).at(held["start"].tolist()):

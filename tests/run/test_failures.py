@@ -20,13 +20,13 @@ from tests.servers.openai_chat import OpenAIChat
 class BySeed(OpenAIChat):
     """Ends each request as its seed says."""
 
-    def __init__(self, endings):
+    def __init__(self, endings, **more):
         super().__init__()
-        self._endings = endings
+        self._endings, self._more = endings, more
 
     def read(self, body, request):
         seen = super().read(body, request)
-        self.faults = Faults(mode=self._endings.get(seen.seed or 0, "ok"))
+        self.faults = Faults(mode=self._endings.get(seen.seed or 0, "ok"), **self._more)
         return seen
 
 
@@ -69,6 +69,15 @@ def test_a_model_that_cannot_answer_is_stopped_alone(workspace):
     assert "All 300 samples are done" in again.out
     assert not (workspace.out / STOPPED).exists()
     assert [server.ended["ok"] for server in servers] == [100, 100, 100]
+
+
+def test_a_model_that_is_stopped_waits_for_no_other_attempt(workspace):
+    server = BySeed({0: "429", 1: "401"}, retry_after="100")
+    with workspace.served(server, seeds=[0, 1]), workspace.start("--limit", "1") as process:
+        out, err = process.communicate(timeout=60)
+    assert (process.returncode, err) == (1, "")
+    assert "alpha was stopped: HTTP 401" in out
+    assert "0 of 2 samples are done" in out
 
 
 def test_each_way_to_fail_is_an_outcome_of_its_own(workspace):

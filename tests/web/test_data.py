@@ -216,12 +216,13 @@ def test_only_whole_models_have_ranks():
     assert f"1 of {len(SCENES)} answered" in lacking
 
 
-def site_run(where, track="full_planning", suite=None, **more):
+def site_run(where, track="full_planning", suite=None, first=None, **more):
     """A run of one track alone, with its identity."""
     tracks = {track: {"prompt": {"name": "p", "version": "a" * 64}}}
     facts = {"tracks": tracks, "created": "2026-11-22T10:00:00+00:00", **of_data(), **more}
     made = manifest(**facts)
     made["suite"] |= {"tracks": [track], **(suite or {})}
+    made["models"][0] |= first or {}
     return SiteRun(where, run_of([], made), Sources())
 
 
@@ -236,6 +237,19 @@ def test_a_model_asked_different_things_is_one_row_and_the_same_things_two():
         assert names[0] == "alpha (2026-11-22 10:00:00, run 00000000)"
         assert names[2] == f"alpha (2026-11-22 {hour}:00:00, run {digit * 8})"
         assert len(set(names)) == len(names)
+
+
+def test_a_baseline_with_the_same_result_in_several_runs_is_one_row():
+    dates = [f"2026-11-2{day}T10:00:00+00:00" for day in (1, 2)]
+    both = [
+        site_run("x", created=date, models=("random", "alpha"), first={"kind": "baseline"})
+        for date in dates
+    ]
+    entries = entries_of(both)
+    assert [entry.name.partition(" ")[0] for entry in entries] == ["random", "alpha", "alpha"]
+    assert [entry.runs for entry in entries] == [{"full_planning": n} for n in (0, 0, 1)]
+    rows = board_of(both, entries)["rows"]
+    assert [row["model"] for row in rows] == ["random", "alpha", "alpha"]
 
 
 def shown(images, digest):

@@ -31,7 +31,7 @@ const Charts = (() => {
   /** Ranked rows with a bar each; a line through all of them stands at the strongest blind baseline. */
   function bars(track) {
     const main = Data.mainOf(track), rows = ranked(track), levels = Data.levelsOf(track);
-    const random = Data.board.rows.find(({ name, kind }) => name === "random" && kind === "baseline");
+    const random = Data.board.rows.find(({ model, kind }) => model === "random" && kind === "baseline");
     const chance = track.floor?.name === "random" ? null : random && valueOf(random, main);
     const lines = [track.floor && [track.floor.name, track.floor.value, "floor"],
       chance !== null && chance !== undefined && ["random", chance, "chance"]].filter(Boolean);
@@ -84,7 +84,7 @@ const Charts = (() => {
     if (levels.length < 2 || !rows.length) return null;
     const isNarrow = innerWidth < 700, longest = isNarrow ? 22 : 28;
     const [width, height, left, right, top, bottom] = isNarrow ? [420, 320, 30, 170, 18, 34] : [860, 380, 46, 220, 18, 34];
-    const floor = Data.board.rows.find((row) => row.name === track.floor?.name && isWhole(row));
+    const floor = Data.board.rows.find((row) => row.model === track.floor?.name && isWhole(row));
     const all = [...new Set([...rows, ...(floor ? [floor] : [])])], end = levels.at(-1);
     const most = Math.max(...all.flatMap((row) => levels.map((level) => valueOf(row, level))), 1);
     const x = (i) => left + (i * (width - left - right)) / (levels.length - 1);
