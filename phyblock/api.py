@@ -623,7 +623,7 @@ def run_suite(
     is_agreed = yes or plan.suite.limits.max_cost_usd is not None
     if costly := [] if is_agreed else may_bill(plan, folder, **asks):
         found = ", ".join(row.model.name for row in costly if row.may_cost)
-        hint = "agree with yes=True, or give prices and set 'limits.max_cost_usd=5' in the suite"
+        hint = "agree with yes=True, or give prices and load_suite(NAME, 'limits.max_cost_usd=5')"
         where, message = f"suite {plan.suite.name}", "would cost money, and was not confirmed"
         raise SpecError(Problem(where, message, found=found, hint=hint))
 

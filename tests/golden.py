@@ -108,6 +108,9 @@ def main() -> None:
     """Write the golden runs that are named again."""
     golden = json.loads(GOLDEN.read_text(encoding="utf-8"))
     for name in sys.argv[1:] or [*RUNS, "requests"]:
+        if name == "paper-table1" and official_root() is None:
+            print("paper-table1 needs the official data: left as it is")
+            continue
         with tempfile.TemporaryDirectory(prefix="phyblock-golden-") as folder:
             root, pictures = Path(folder), Path(folder) / "cache" / "pictures"
             if name == "requests":

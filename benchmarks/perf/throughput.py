@@ -6,8 +6,8 @@ The server speaks the OpenAI chat protocol, answers after the given latency, and
 of its own; every call carries a picture of about 150 KB. All figures come from one run of this
 script: wall time, CPU time and peak memory of the whole process tree, pictures rendered and modules
 compiled before, as an installation compiles them. The bare loops only call; a run also judges,
-records, and writes tables and the report. Two baselines beside the model, as in runs by default,
-are two samples more for each call: a line of its own.
+records, and writes tables and the report. The two baselines that runs have by default add two
+samples per call; they have lines of their own.
 """
 
 from __future__ import annotations

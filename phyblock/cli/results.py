@@ -46,7 +46,7 @@ _FAILURES = 4
 )
 @data_option
 def report(run: Path, prints: bool, names: tuple[str, ...], form: str, data: Path | None) -> None:
-    """Write tables and report.html of the folder RUN again; with --print, print its tables.
+    """Write tables and report.html of the folder RUN again, or print its tables.
 
     Uses only the files of the run: no model, no network. Draws scenes if the data set is
     available.
@@ -148,7 +148,8 @@ def show(run: Path, sample: str, data: Path | None) -> None:
         task = as_recorded(dataset.task(record.scene), record)
         blocks = enumerate(task.candidates.candidates, 1)
         names = ", ".join(f"{n} {one.color} {one.type}" for n, one in blocks)
-        needed = ", ".join(str(task.candidates.index_of(b.look)) for b in task.scene.blocks)
+        places = (task.candidates.index_of(block.look) for block in task.scene.blocks)
+        needed = ", ".join("none" if place is None else str(place) for place in places)
         console.print(f"Candidates: {names}\nGoal: {needed}\n", style="dim")
     except DataError as error:
         console.print(f"Names of blocks are not shown: {error}\n", style="dim")

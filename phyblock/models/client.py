@@ -369,6 +369,7 @@ class HttpClient:
                     response.close()
                 return Answer(response.status, response.headers, content, fault)
         except (aiohttp.ConnectionTimeoutError, aiohttp.ClientConnectorError) as error:
+            host = error.host if isinstance(error, aiohttp.ClientProxyConnectionError) else host
             said = f"no connection to {host}: {getattr(error, 'os_error', error)}"
             raise RetryableError(said, sent="no") from None
         except TimeoutError:

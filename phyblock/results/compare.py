@@ -13,6 +13,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from phyblock.config.suite import REPEAT
+from phyblock.config.yaml import shown
 from phyblock.errors import Problem, SpecError
 from phyblock.files import OutFolder
 from phyblock.results.estimates import (
@@ -33,8 +34,7 @@ from phyblock.tracks.measures import SCORED_BY, Cell, Measure, in_unit
 
 _LEVEL = 1 - statistics.CONFIDENCE
 _KEYS = ["scene", "item", "seed", "variant"]
-_NOT_ASKED = ("name", "description", "models", "baselines", "seeds", "limit", "levels", "tracks",
-              "dataset", "vary")  # fmt: skip
+_ASKED = ("prompt", "answer_format", "parser", "images", "candidates", "settings", "scoring")
 _JOINT = ("p_holm", "verdict", "detectable_holm")
 """Columns of `Comparison.table` that depend on all of its tests."""
 
@@ -366,9 +366,10 @@ def compare_pairs(
     table["verdict"] = [_verdict(row, measure, n_tests) for row in table.to_dict("records")]
     level, spread = _LEVEL / max(n_tests, 1), (table["se"], table["n_clusters"])
     table["detectable_holm"] = statistics.detectable(*spread, level, measure.most_apart)
-    said = [pd.json_normalize(run.manifest.suite).iloc[0] for run in runs]
-    names = [name for name in said[0].index if not name.startswith(_NOT_ASKED)]
-    both = [(name, said[0][name], said[-1].get(name)) for name in names]
+    said = [pd.json_normalize(run.manifest.suite).to_dict("records")[0] for run in runs]
+    ours = {*_ASKED, kind_of(what.track).section}
+    names = [str(name) for name in said[0] | said[-1] if str(name).partition(".")[0] in ours]
+    both = [(name, *(shown(one.get(name)) for one in (said[0], said[-1]))) for name in names]
     differ = ", ".join(f"{name} ({a}, {b})" for name, a, b in both if a != b)
     how = [what.how, *([f"The runs differ in {differ}."] if differ else [])]
     how += [f"Run {run.path.name}: {', '.join(words)}."

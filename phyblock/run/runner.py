@@ -348,12 +348,12 @@ class Session:
             self.watch(stop)
 
     async def _until_stopped(self, work: Coroutine[Any, Any, _Result]) -> _Result:
-        """Return the result of work, which is cancelled when the run stops. Raises HaltedError
-        then, unless the work completes, as a request in progress does.
+        """Return the result of work, which is cancelled when the run or its model is stopped.
+        Raises HaltedError then, unless the work completes, as a request in progress does.
         """
-        task, message = asyncio.current_task(), "the run was ended before this request was sent"
+        task, message = asyncio.current_task(), "it was stopped before this request was sent"
         assert task is not None
-        if self.result.stop is not None:
+        if self.result.stop is not None or task.get_name() in self.result.stopped:
             work.close()
             raise HaltedError(message)
         self._waiting.add(task)

@@ -171,6 +171,17 @@ ITEMS = 12
 ASKED = {"alpha": ITEMS, "beta": ITEMS, "gamma": ITEMS}
 
 
+def test_what_two_runs_asked_differently_is_named():
+    def asked(**images):
+        facts = manifest(seeds=[0], settings=["A"], matchers=["optimal"])
+        facts["suite"] |= {"images": {"size_px": 512, **images}, "name": f"n{len(images)}"}
+        return run_of(plans("alpha", {"000": 4, "001": 2}), facts)
+
+    assert "differ" not in compare(asked(), asked()).how
+    how = compare(asked(), asked(size_px=256)).how
+    assert "The runs differ in images.size_px (512, 256)." in how
+
+
 def varied(models):
     """Return a run of the first so many scenes of each model in every way, of others in one way."""
     told = manifest(models=models, seeds=(0, 1), levels=(2,), settings=["A"], matchers=["optimal"])

@@ -6,6 +6,11 @@ import re
 import signal
 import threading
 
+import pytest
+
+from phyblock.config.models import load_models
+from phyblock.config.suite import load_suite
+from phyblock.run.plan import estimate, make_plan
 from tests.servers.batches import BatchFaults, OpenAIBatches
 from tests.servers.chassis import Running
 
@@ -105,3 +110,15 @@ def killed_at(workspace, server, number):
         process.communicate()
     server.moment = lambda _: None
     return reached.is_set()
+
+
+def test_calls_in_batches_are_estimated_at_half_the_price(workspace):
+    prepare(workspace, "http://127.0.0.1:9")
+    suite = load_suite(workspace.root / "suite.yaml")
+    costs = []
+    for name in ("models.yaml", "singly.yaml"):
+        plan = make_plan(suite, load_models(workspace.root / name), only=["alpha"])
+        rows = estimate(plan, workspace.out, use_cache=False)
+        costs.append(next((row.cost_usd, row.most_usd) for row in rows if row.calls))
+    assert min(costs[0]) > 0
+    assert [2 * usd for usd in costs[0]] == pytest.approx(costs[1])

@@ -80,6 +80,18 @@ def test_a_model_that_is_stopped_waits_for_no_other_attempt(workspace):
     assert "0 of 2 samples are done" in out
 
 
+def test_a_sample_whose_every_attempt_failed_is_asked_again_by_the_same_command(workspace):
+    endings = {1: "500"}
+    few = ("--set", "limits.max_attempts=2", "--set", "limits.retry_for_s=0")
+    with workspace.served(BySeed(endings), seeds=[0, 1]) as server:
+        assert workspace.run(*few).code == 1
+        assert server.requests == 5 + 2 * 5
+        endings.clear()
+        workspace.completed(*few)
+        assert server.requests == 5 + 2 * 5 + 5
+    assert {record["outcome"] for record in workspace.records()[-5:]} == {"ok"}
+
+
 def test_each_way_to_fail_is_an_outcome_of_its_own(workspace):
     endings = {1: "400", 2: "policy", 3: "length", 4: "filtered", 5: "blank"}
     outcomes = ("ok", "api_error", "refusal", "truncated", "refusal", "parse_failure")

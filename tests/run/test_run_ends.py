@@ -22,7 +22,7 @@ from phyblock.errors import SimulationError
 from phyblock.records.files import STOPPED
 from phyblock.run.plan import make_plan
 from phyblock.run.rescore import rescore
-from phyblock.run.runner import SampleDone, Session, Stopping
+from phyblock.run.runner import SampleDone, Session, Stopping, to_its_end
 from phyblock.run.store import AppendFile
 from phyblock.sim import dynamics
 from phyblock.tracks.full_planning import FullPlanning
@@ -354,3 +354,26 @@ def test_a_wait_for_another_attempt_or_for_a_server_is_given_up(workspace, words
     assert f"0 of {SAMPLES} samples are done (interrupted)" in out
     assert not workspace.records()
     assert server.requests <= AT_ONCE
+
+
+def test_what_must_be_done_is_done_though_nobody_waits():
+    done = []
+
+    async def work():
+        await asyncio.sleep(0.05)
+        done.append("work")
+        return "record"
+
+    async def wait():
+        return await to_its_end(work())
+
+    async def cancelled():
+        waiting = asyncio.create_task(wait())
+        for _ in range(3):
+            await asyncio.sleep(0.01)
+            waiting.cancel()
+        return await waiting
+
+    assert asyncio.run(cancelled()) == ("record", True)
+    assert done == ["work"]
+    assert asyncio.run(wait()) == ("record", False)

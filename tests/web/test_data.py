@@ -216,13 +216,12 @@ def test_only_whole_models_have_ranks():
     assert f"1 of {len(SCENES)} answered" in lacking
 
 
-def site_run(where, track="full_planning", suite=None, first=None, **more):
+def site_run(where, track="full_planning", suite=None, **more):
     """A run of one track alone, with its identity."""
     tracks = {track: {"prompt": {"name": "p", "version": "a" * 64}}}
     facts = {"tracks": tracks, "created": "2026-11-22T10:00:00+00:00", **of_data(), **more}
     made = manifest(**facts)
     made["suite"] |= {"tracks": [track], **(suite or {})}
-    made["models"][0] |= first or {}
     return SiteRun(where, run_of([], made), Sources())
 
 
@@ -239,17 +238,13 @@ def test_a_model_asked_different_things_is_one_row_and_the_same_things_two():
         assert len(set(names)) == len(names)
 
 
-def test_a_baseline_with_the_same_result_in_several_runs_is_one_row():
-    dates = [f"2026-11-2{day}T10:00:00+00:00" for day in (1, 2)]
-    both = [
-        site_run("x", created=date, models=("random", "alpha"), first={"kind": "baseline"})
-        for date in dates
-    ]
-    entries = entries_of(both)
-    assert [entry.name.partition(" ")[0] for entry in entries] == ["random", "alpha", "alpha"]
-    assert [entry.runs for entry in entries] == [{"full_planning": n} for n in (0, 0, 1)]
-    rows = board_of(both, entries)["rows"]
-    assert [row["model"] for row in rows] == ["random", "alpha", "alpha"]
+def test_a_baseline_is_one_row_of_all_runs_where_its_result_is_the_same():
+    first = planned(rules=["rule"], rule=2, a=1)
+    for right, models in ((2, ["rule", "a", "b"]), (1, ["rule", "a", "rule", "b"])):
+        runs = [first, planned(rules=["rule"], rule=right, b=3)]
+        rows = board_of(runs, entries_of(runs))["rows"]
+        assert [row["model"] for row in rows] == models
+        assert len({row["name"] for row in rows} & {"rule"}) == (len(models) == 3)
 
 
 def shown(images, digest):

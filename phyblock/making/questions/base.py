@@ -182,7 +182,7 @@ def read_again(question: Question) -> Draft:
     """Return a question as its maker gets it to find the answer, which is not used.
 
     Options that are pictures are no longer among its `pictures`. Raises UnfairError unless the
-    wording with its slots is the text.
+    wording with its slots is the text, and the scene the first of the other pictures.
     """
     slots = question.evidence.get("slots", {})
     if fill_template(WORDINGS[question.wording], slots) != question.text:
@@ -190,6 +190,8 @@ def read_again(question: Question) -> Draft:
     texts = {name: str(slot) for name, slot in slots.items()}
     pictures = {picture.label: picture for picture in question.pictures}
     options = [pictures.pop(a, b) for a, b in zip(LETTERS, question.options, strict=True)]
+    if (labels := [*pictures]) not in ([], ["scene"], ["scene", "block"]):
+        raise UnfairError(f"has the pictures {labels}, and not the scene first")
     shown = tuple(pictures.values())
     return Draft(question.wording, question.scene, shown, texts, tuple(options))
 

@@ -162,9 +162,9 @@ def problem_of(question: Question) -> str | None:
         derived = maker.answer(read_again(question))
     except PhyblockError as error:
         return str(error)
-    except (KeyError, TypeError, ValueError) as error:
-        # A wording, slots or words in them that are not of this kind of question.
-        return f"its wording or its slots cannot be read ({error!r})"
+    except (LookupError, TypeError, ValueError) as error:
+        # A wording, slots, words in them or pictures that are not of this kind of question.
+        return f"its wording, slots or pictures cannot be read ({error!r})"
     if derived != question.answer:
         letters = "".join(LETTERS[index] for index in derived)
         return f"the answer is {letters}, not {question.answer_letters}"
