@@ -10,10 +10,10 @@ origin at the center of the flat (hypotenuse) face, the arch at the center of it
 from __future__ import annotations
 
 import functools
-import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import permutations, product
 from typing import Literal, cast, get_args
 
 import numpy as np
@@ -194,11 +194,6 @@ class Shape:
     def is_box(self) -> bool:
         """True if the solid fills its bounding box."""
         return math.isclose(self.volume_m3, math.prod(self.sides_m))
-
-    @property
-    def is_cube(self) -> bool:
-        """True for a box with equal sides, which has more symmetries than `fold` says."""
-        return self.is_box and len(set(self.sides_m)) == 1
 
     @property
     def is_round(self) -> bool:
@@ -387,8 +382,15 @@ def euler_deg_to_matrix(euler_deg: Euler) -> NDArray[np.float64]:
 def symmetries(block_type: BlockType) -> NDArray[np.float64]:
     """Rotations that map the block onto itself, body frame, shape (k, 3, 3)."""
     shape = SHAPES[block_type]
-    if shape.is_cube:
-        return _cube_rotations()
+    if shape.is_box and len(set(shape.sides_m)) == 1:
+        # A cube has more symmetries than `fold` says.
+        rotations = []
+        for axes, signs in product(permutations(range(3)), product((1.0, -1.0), repeat=3)):
+            matrix = np.zeros((3, 3))
+            matrix[range(3), axes] = signs
+            if np.linalg.det(matrix) > 0:
+                rotations.append(matrix)
+        return np.stack(rotations)
     turns = [euler_deg_to_matrix((0.0, 0.0, 360.0 * i / shape.fold)) for i in range(shape.fold)]
     if shape.flips:
         # Every block is its own mirror image in x = 0: without the half turn about z, the one about
@@ -396,17 +398,6 @@ def symmetries(block_type: BlockType) -> NDArray[np.float64]:
         half_turn = [1.0, -1.0, -1.0] if shape.fold % 2 == 0 else [-1.0, 1.0, -1.0]
         turns += [turn @ np.diag(half_turn) for turn in turns]
     return np.stack(turns)
-
-
-def _cube_rotations() -> NDArray[np.float64]:
-    rotations = []
-    for axes in itertools.permutations(range(3)):
-        for signs in itertools.product((1.0, -1.0), repeat=3):
-            matrix = np.zeros((3, 3))
-            matrix[range(3), axes] = signs
-            if np.linalg.det(matrix) > 0:
-                rotations.append(matrix)
-    return np.stack(rotations)
 
 
 @functools.cache

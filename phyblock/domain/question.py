@@ -131,16 +131,23 @@ def rotated(question: Question, by: int) -> Question:
     Pictures that are options, and lettered places that the options name, keep their place in the
     world and take the new letter of their option.
     """
-    n = len(question.options)
-    moved = tuple(question.options[(i + by) % n] for i in range(n))
-    names_letters = all(map(is_picture_option, question.options)) or _names_marks(question)
-    pictures = tuple(_relabeled(picture, by, n, question) for picture in question.pictures)
-    return replace(
-        question,
-        options=question.options if names_letters else moved,
-        answer=tuple((index - by) % n for index in question.answer),
-        pictures=pictures,
+    n, options = len(question.options), question.options
+    marked = {mark.letter for picture in question.pictures for mark in picture.marks}
+    # Options may name places lettered in a picture: `place A`, `place B`, ...
+    names_marks = marked.issuperset(LETTERS[:n]) and all(
+        option.split()[-1:] == [letter] for option, letter in zip(options, LETTERS[:n], strict=True)
     )
+    pictures = []
+    for picture in question.pictures:
+        marks = picture.marks
+        if names_marks:
+            marks = tuple(Mark(rotated_label(m.letter, by, n), m.position_m) for m in marks)
+        label = rotated_label(picture.label, by, n)
+        pictures.append(replace(picture, label=label, marks=marks))
+    if not names_marks and not all(map(is_picture_option, options)):
+        options = tuple(options[(i + by) % n] for i in range(n))
+    answer = tuple((index - by) % n for index in question.answer)
+    return replace(question, options=options, answer=answer, pictures=tuple(pictures))
 
 
 def rotated_label(label: str, by: int, n: int) -> str:
@@ -148,20 +155,3 @@ def rotated_label(label: str, by: int, n: int) -> str:
     if label not in LETTERS[:n]:
         return label
     return LETTERS[(LETTERS.index(label) - by) % n]
-
-
-def _relabeled(picture: QuestionPicture, by: int, n: int, question: Question) -> QuestionPicture:
-    marks = picture.marks
-    if _names_marks(question):
-        marks = tuple(Mark(rotated_label(m.letter, by, n), m.position_m) for m in marks)
-    return replace(picture, label=rotated_label(picture.label, by, n), marks=marks)
-
-
-def _names_marks(question: Question) -> bool:
-    """True if the options name places lettered in a picture: `place A`, `place B`, ..."""
-    marked = {mark.letter for picture in question.pictures for mark in picture.marks}
-    letters = LETTERS[: len(question.options)]
-    return marked.issuperset(letters) and all(
-        option.split()[-1:] == [letter]
-        for option, letter in zip(question.options, letters, strict=True)
-    )

@@ -8,8 +8,7 @@ from functools import cached_property, partial
 from typing import NamedTuple
 
 from phyblock.domain.blocks import KIT_PALETTE, orientation_class
-from phyblock.domain.scene import MAX_CANDIDATES, CandidateSet, Kind, Scene
-from phyblock.domain.symmetry import fingerprint
+from phyblock.domain.scene import MAX_CANDIDATES, CandidateSet, Kind, Scene, fingerprint
 from phyblock.errors import Problem
 from phyblock.making.scenes.sketch import POSES
 from phyblock.sim.contact import FIT_TOLERANCE_M, GROUND, find_gaps, find_overlaps, support_graph

@@ -38,8 +38,7 @@ from phyblock.data.lookup import find_data_set, find_questions, read_data_set
 from phyblock.data.questions import read_questions
 from phyblock.data.scenes import SCENES_FILE
 from phyblock.domain.question import LETTERS, SUBTASK_NAMES, SUBTASKS, Subtask
-from phyblock.domain.scene import AssemblyTask
-from phyblock.domain.symmetry import fingerprint
+from phyblock.domain.scene import AssemblyTask, fingerprint
 from phyblock.errors import DataError, Problem
 from phyblock.files import OutFolder, bundled_sets, write_named
 from phyblock.making import checks, files, season

@@ -10,7 +10,7 @@ import functools
 import math
 import operator
 from collections import Counter
-from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from heapq import heappop, heappush
 from typing import Literal, get_args
@@ -121,9 +121,11 @@ class Goal:
     def __init__(self, scene: Scene, candidates: CandidateSet, setting: Setting) -> None:
         attribute = "look" if setting == "A" else "kind"
         self.graph = graph = scene.graph
-        looks, kinds = (
-            _groups(getattr(block, name) for block in scene.blocks) for name in (attribute, "kind")
-        )
+        looks: dict[Hashable, tuple[int, ...]] = {}
+        kinds: dict[Hashable, tuple[int, ...]] = {}
+        for vertex, block in enumerate(scene.blocks):
+            for groups, value in ((looks, getattr(block, attribute)), (kinds, block.kind)):
+                groups[value] = (*groups.get(value, ()), vertex)
         self.equal_to: dict[int, tuple[int, ...]] = {}
         self.equal: dict[int, int] = {}
         self.of_kind: dict[int, int] = {}
@@ -144,14 +146,6 @@ class Goal:
         free = ~placed
         return [v for v, itself, needed in self.ways[index] if needed & free == itself]
 
-    def distinct(self, vertices: Sequence[int]) -> list[int]:
-        """The first of each group of vertices that unlock the same blocks: where both are ready,
-        they are interchangeable.
-        """
-        if len(vertices) < 2:
-            return list(vertices)
-        return list({self.graph.unlocks[v]: v for v in reversed(vertices)}.values())
-
     def error(self, index: int, placed: int) -> ErrorType:
         """The type of a wrong step that names candidate `index` when `placed` are placed."""
         if not self.of_kind[index]:
@@ -165,14 +159,6 @@ class Goal:
 
 def _mask(vertices: Iterable[int]) -> int:
     return sum(1 << vertex for vertex in vertices)
-
-
-def _groups(values: Iterable[Hashable]) -> dict[Hashable, tuple[int, ...]]:
-    """Return, for each value, the places that have it."""
-    groups: dict[Hashable, tuple[int, ...]] = {}
-    for place, value in enumerate(values):
-        groups[value] = (*groups.get(value, ()), place)
-    return groups
 
 
 @dataclass(frozen=True)
@@ -235,7 +221,10 @@ def _best_choices(goal: Goal, plan: Plan) -> list[int | None]:
         costs: dict[int, int] = {}
         taken: dict[int, int | None] = {}
         for placed, cost in frontier.items():
-            choices = goal.distinct(goal.choices(index, placed))
+            choices = goal.choices(index, placed)
+            if len(choices) > 1:
+                # Ready vertices that unlock the same blocks are interchangeable.
+                choices = list({goal.graph.unlocks[v]: v for v in reversed(choices)}.values())
             if not choices:
                 more = cost + cost_of[goal.error(index, placed)]
                 if more < costs.get(placed, more + 1):
@@ -435,25 +424,21 @@ def steps_kept(goal: Goal, plan: Plan, at_least: int = 0) -> int:
         at, most = -before, -least
         if at == len(steps) or most == kept.bit_count() or most <= at_least:
             return max(most, at_least)
-        for now, closed_now in _kept_after(goal, steps[at], kept, closed):
+        ways = [(kept, closed)]  # The step is dropped, or is one of its equal blocks.
+        roles = set()
+        free = steps[at] & ~closed
+        while free:
+            bit = free & -free
+            free ^= bit
+            vertex = bit.bit_length() - 1
+            role = (goal.graph.above[vertex] ^ bit, goal.graph.below[vertex] ^ bit)
+            if role not in roles:
+                roles.add(role)
+                ways.append((kept | bit, closed | goal.graph.below[vertex]))
+        for now, closed_now in ways:
             if (at + 1, now) not in seen:
                 seen.add((at + 1, now))
                 heappush(open_ways, (-bound(at + 1, now, closed_now), -at - 1, now, closed_now))
-
-
-def _kept_after(goal: Goal, equal: int, kept: int, closed: int) -> Iterator[tuple[int, int]]:
-    """Yield sets of kept and closed blocks after a step that is dropped or is one of `equal`."""
-    yield kept, closed
-    roles = set()
-    free = equal & ~closed
-    while free:
-        bit = free & -free
-        free ^= bit
-        vertex = bit.bit_length() - 1
-        role = (goal.graph.above[vertex] ^ bit, goal.graph.below[vertex] ^ bit)
-        if role not in roles:
-            roles.add(role)
-            yield kept | bit, closed | goal.graph.below[vertex]
 
 
 @dataclass(frozen=True, kw_only=True)

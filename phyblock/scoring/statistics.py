@@ -28,7 +28,7 @@ Test Scores*, 1968).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -125,8 +125,16 @@ def jackknife(
         np.asarray(clusters.size if n_clusters is None else n_clusters, dtype=np.intp), value.shape
     )
     shared = np.zeros(value.shape)
-    for sign, units, groups in _in_common(clusters):
-        shared += sign * _squares(given[units], groups, total, metric, value)
+    # For one, two, ... base scenes in common: a unit with two is in two groups of one, and in one
+    # group of two.
+    members = np.sort(clusters.members, axis=1)
+    for size in range(1, members.shape[1] + 1):
+        sets = [members[:, list(of)] for of in combinations(range(members.shape[1]), size)]
+        stacked, units = np.concatenate(sets), np.tile(np.arange(len(members)), len(sets))
+        whole = (stacked < clusters.size).all(axis=1)
+        _, groups = np.unique(stacked[whole], axis=0, return_inverse=True)
+        squares = _squares(given[units[whole]], groups.reshape(-1), total, metric, value)
+        shared += squares if size % 2 else -squares
     alone = _squares(given, np.arange(len(given)), total, metric, value)
     df = np.where(behind > 1, behind - 1.0, np.nan)
     se = np.sqrt(np.maximum(shared, alone) * df / behind)
@@ -207,23 +215,6 @@ def detectable(
     error = np.asarray(se, dtype=np.float64)
     difference = (stdtrit(df, 1 - level / 2) + stdtrit(df, POWER)) * error
     return np.where((error > 0) & (difference <= most), difference, np.nan)
-
-
-def _in_common(
-    clusters: Clusters,
-) -> Iterator[tuple[int, NDArray[np.intp], NDArray[np.intp]]]:
-    """Yield, for one, two, ... base scenes in common, the sign, the units, and the group of each.
-
-    A unit with two base scenes is in two groups of one, and in one group of two.
-    """
-    members = np.sort(clusters.members, axis=1)
-    for size in range(1, members.shape[1] + 1):
-        sets = [members[:, list(of)] for of in combinations(range(members.shape[1]), size)]
-        stacked = np.concatenate(sets)
-        units = np.tile(np.arange(len(members)), len(sets))
-        whole = (stacked < clusters.size).all(axis=1)
-        _, groups = np.unique(stacked[whole], axis=0, return_inverse=True)
-        yield (1 if size % 2 else -1), units[whole], groups.reshape(-1)
 
 
 def _squares(

@@ -107,24 +107,15 @@ class Assembly:
         before = self.placed
         self._frontier = reached
         self.chosen.append(index)
-        return self._show(index, before)
-
-    def _choices(self, index: int, mask: int) -> list[int]:
-        """Vertices a candidate can be placed as, one of each group that is interchangeable."""
-        choices = self._goal.choices(index, mask)
-        if len(choices) < 2:
-            return choices
-        return list({self._roles[v]: v for v in reversed(choices)}.values())
-
-    def _show(self, index: int, before: int) -> Move:
-        """Bring the world to one of the sets that explain all moves, with the least change."""
+        # The world becomes one of the sets that explain all moves, with the least change.
+        blocks = self.scene.blocks
         if open_to := self._choices(index, before):
-            look, blocks = self.candidates[index].look, self.scene.blocks
+            look = self.candidates[index].look
             vertex = max(open_to, key=lambda v: (blocks[v].look == look, self._above[v], -v))
             self.placed = before | 1 << vertex
             return Move("placed", vertex)
         self.placed = min(self._frontier, key=lambda mask: ((before & ~mask).bit_count(), mask))
-        attribute, blocks = ("look" if self.setting == "A" else "kind"), self.scene.blocks
+        attribute = "look" if self.setting == "A" else "kind"
         entered = list(_bits(self.placed & ~before))
         pairs: list[tuple[int, int]] = []
         for left in _bits(before & ~self.placed):
@@ -133,6 +124,13 @@ class Assembly:
             entered.remove(twin)
             pairs.append((left, twin))
         return Move("placed", entered[0], tuple(pairs))
+
+    def _choices(self, index: int, mask: int) -> list[int]:
+        """Vertices a candidate can be placed as, one of each group that is interchangeable."""
+        choices = self._goal.choices(index, mask)
+        if len(choices) < 2:
+            return choices
+        return list({self._roles[v]: v for v in reversed(choices)}.values())
 
 
 def placed_counts(

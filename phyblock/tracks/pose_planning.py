@@ -15,7 +15,7 @@ import numpy as np
 from phyblock.config.validation import PictureControls, TemplateName
 from phyblock.domain.scene import AssemblyTask, Block, Plan, PoseStep, Scene
 from phyblock.files import bundled
-from phyblock.parsing.poses import (
+from phyblock.parsing.plan import (
     FARTHEST_PLACE_CM,
     MOST_POSE_STEPS,
     ParsedPoses,
@@ -28,12 +28,12 @@ from phyblock.scoring.plan import AssemblyScorer
 from phyblock.scoring.pose import (
     POSE_ERRORS,
     POSE_FRAMES,
+    TOLERANCES_CM,
     PoseError,
     PoseScorer,
     blocks_reached,
     pose_errors,
 )
-from phyblock.scoring.pose_matching import TOLERANCES_CM
 from phyblock.sim.balance import is_balanced, surely_stands
 from phyblock.sim.contact import voxel_iou
 from phyblock.sim.dynamics import ExecutionLimits, execute, execution_physics, groups

@@ -18,8 +18,7 @@ from phyblock.domain.blocks import (
     orientation_class,
     quat_xyzw_to_matrix,
 )
-from phyblock.domain.scene import AOVGraph, CycleError
-from phyblock.domain.symmetry import angles_deg
+from phyblock.domain.scene import AOVGraph, CycleError, angles_deg
 from tests.scoring.cases import acyclic, any_edges
 from tests.shipped import official_tasks
 

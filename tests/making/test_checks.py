@@ -5,8 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from phyblock.domain.scene import CandidateSet
-from phyblock.domain.symmetry import Symmetry
+from phyblock.domain.scene import CandidateSet, Symmetry
 from phyblock.making import checks
 from phyblock.making.files import SCENE_FILES, SUMS_FILE, sums_text
 from phyblock.making.scenes.candidates import make_candidates

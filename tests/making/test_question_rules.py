@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 
 from phyblock.domain.blocks import COLORS, SHAPES
 from phyblock.domain.question import LETTERS, Mark, QuestionPicture
-from phyblock.domain.scene import Block, Scene
-from phyblock.domain.symmetry import SYMMETRIES
+from phyblock.domain.scene import SYMMETRIES, Block, Scene
 from phyblock.making.questions import dynamics
 from phyblock.making.questions.base import WORDINGS, Draft, UnfairError, four_alike, ranks_among
 from phyblock.making.questions.guesses import keeping_odds

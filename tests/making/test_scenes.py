@@ -10,8 +10,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from phyblock.domain.blocks import BLOCK_TYPES, KIT_PALETTE, SHAPES
-from phyblock.domain.scene import Block
-from phyblock.domain.symmetry import SYMMETRIES, canonical_form
+from phyblock.domain.scene import SYMMETRIES, Block, canonical_form
 from phyblock.making.checks import FORM, PHYSICS, SceneFacts, check_set, findings_of
 from phyblock.making.scenes import sketch
 from phyblock.making.scenes.production import (

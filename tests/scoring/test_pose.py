@@ -11,11 +11,9 @@ from scipy.optimize import linear_sum_assignment
 from scipy.spatial.transform import Rotation
 
 from phyblock.domain.blocks import BLOCK_TYPES, SHAPES, euler_deg_to_matrix, symmetries, turn_deg
-from phyblock.domain.scene import Block, Candidate, CandidateSet, Plan, Scene
-from phyblock.domain.symmetry import angles_deg
+from phyblock.domain.scene import Block, Candidate, CandidateSet, Plan, Scene, angles_deg
 from phyblock.scoring.plan import Goal, most_placed
-from phyblock.scoring.pose import PoseScorer, overlap_volume
-from phyblock.scoring.pose_matching import Motion, Nearness, cheapest, matched
+from phyblock.scoring.pose import Motion, Nearness, PoseScorer, cheapest, matched, overlap_volume
 from phyblock.sim.contact import pieces_of
 from phyblock.sim.engine import quat_xyzw_to_euler_deg
 from tests.scoring.cases import cases

@@ -13,8 +13,7 @@ from phyblock.domain.scene import Block, Candidate, CandidateSet, Plan, Scene
 from phyblock.making.questions.audit import text_rule
 from phyblock.parsing.answer import parse_answer
 from phyblock.parsing.move import parse_move
-from phyblock.parsing.plan import parse_plan
-from phyblock.parsing.poses import parse_poses
+from phyblock.parsing.plan import parse_plan, parse_poses
 from phyblock.scoring.plan import Goal
 from phyblock.sim.pictures import joined_size_px
 from phyblock.tracks import goal_blind

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from phyblock.domain.scene import Block, Candidate, CandidateSet, PoseStep
 from phyblock.errors import StoreError
-from phyblock.parsing.poses import parse_poses
+from phyblock.parsing.plan import parse_poses
 from phyblock.records.files import known_records
 from phyblock.run.rescore import rescore
 from phyblock.run.store import begun, judged

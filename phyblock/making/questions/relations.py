@@ -16,8 +16,7 @@ import numpy as np
 
 from phyblock.domain.blocks import SHAPES, BlockType, Euler, euler_deg_to_matrix, orientation_class
 from phyblock.domain.question import QuestionPicture, Subtask
-from phyblock.domain.scene import Block, Scene
-from phyblock.domain.symmetry import angles_deg
+from phyblock.domain.scene import Block, Scene, angles_deg
 from phyblock.making.questions import base, sight
 from phyblock.making.questions.base import Draft, Floats, StaticMaker, T, UnfairError, View, pick
 from phyblock.sim.balance import surely_stands

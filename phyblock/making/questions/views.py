@@ -22,8 +22,7 @@ from numpy.typing import NDArray
 
 from phyblock.domain.blocks import COLORS, Color
 from phyblock.domain.question import LETTERS, QuestionPicture, Subtask
-from phyblock.domain.scene import Block, Scene
-from phyblock.domain.symmetry import turned_form
+from phyblock.domain.scene import Block, Scene, turned_form
 from phyblock.making.questions import base, sight
 from phyblock.making.questions.base import Draft, Maker, UnfairError, View, pick
 from phyblock.sim.question_pictures import is_inside, seen, shown_pixels

@@ -22,8 +22,15 @@ import numpy as np
 
 from phyblock.data.scenes import read_builtin
 from phyblock.domain.blocks import COLORS
-from phyblock.domain.scene import AssemblyTask, Block, CycleError, Kind, Scene
-from phyblock.domain.symmetry import SYMMETRIES, fingerprint
+from phyblock.domain.scene import (
+    SYMMETRIES,
+    AssemblyTask,
+    Block,
+    CycleError,
+    Kind,
+    Scene,
+    fingerprint,
+)
 from phyblock.errors import DataError, Problem
 from phyblock.files import bundled, read_own_yaml
 from phyblock.making.checks import LEVEL_LIMITS, is_acceptable

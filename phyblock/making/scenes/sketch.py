@@ -18,8 +18,16 @@ from typing import Any, Literal, TypeVar, cast
 import numpy as np
 
 from phyblock.domain.blocks import BLOCK_TYPES, COLORS, KIT_PALETTE, SHAPES, BlockType, Color, Euler
-from phyblock.domain.scene import AOVGraph, Block, Scene
-from phyblock.domain.symmetry import Symmetry, fingerprint, image_deg, image_m, pose_class
+from phyblock.domain.scene import (
+    AOVGraph,
+    Block,
+    Scene,
+    Symmetry,
+    fingerprint,
+    image_deg,
+    image_m,
+    pose_class,
+)
 from phyblock.files import read_own_yaml
 from phyblock.sim.contact import (
     GROUND,
