@@ -49,10 +49,11 @@ from phyblock.sim.pictures import (
     SMALLEST_PX,
     Lookout,
     PictureStyle,
+    RuledFloor,
     candidates_grid,
     goal_style,
+    kit_sheet,
 )
-from phyblock.sim.ruled import RuledFloor, kit_sheet
 from phyblock.tracks.pictures import LocalShop
 from phyblock.tracks.step_planning import PastStep, StepOutcome, StepPlanning
 from phyblock.types import GATINGS, SETTINGS, Background, Gating, Physics, Setting

@@ -50,10 +50,10 @@ from phyblock.making.scenes.production import Production, builtin_forms, shares
 from phyblock.making.scenes.sketch import PALETTES, Palette, colorless
 from phyblock.sim.camera import VIEWS
 from phyblock.sim.engine import described_engine, other_engine
-from phyblock.sim.film import assembly_gif
 from phyblock.sim.pictures import (
     RENDER_VERSION,
     PictureStyle,
+    assembly_gif,
     candidates_png,
     composite_png,
     goal_png,

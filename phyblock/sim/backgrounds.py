@@ -214,16 +214,12 @@ def sample(background: Background, x_m: Grid, y_m: Grid, footprint_m: Grid) -> N
     colors = np.empty((*x_m.shape, 3), dtype=np.float32)
     for number in np.unique(level).tolist():
         chosen = level == number
-        colors[chosen] = _bilinear(maps[number], x_m[chosen], y_m[chosen])
+        texture, size = maps[number], len(maps[number])
+        across, along = (place[chosen] / PERIOD_M * size - 0.5 for place in (x_m, y_m))
+        column, row = np.floor(across).astype(np.int64), np.floor(along).astype(np.int64)
+        right, down = (across - column)[:, None], (along - row)[:, None]
+        column, row, beside, below = (n % size for n in (column, row, column + 1, row + 1))
+        upper = texture[row, column] * (1 - right) + texture[row, beside] * right
+        lower = texture[below, column] * (1 - right) + texture[below, beside] * right
+        colors[chosen] = (upper * (1 - down) + lower * down).astype(np.float32)
     return colors
-
-
-def _bilinear(texture: NDArray[np.uint8], x_m: Grid, y_m: Grid) -> NDArray[np.float32]:
-    size = len(texture)
-    across, along = (place / PERIOD_M * size - 0.5 for place in (x_m, y_m))
-    column, row = np.floor(across).astype(np.int64), np.floor(along).astype(np.int64)
-    right, down = (across - column)[:, None], (along - row)[:, None]
-    column, row, beside, below = (n % size for n in (column, row, column + 1, row + 1))
-    upper = texture[row, column] * (1 - right) + texture[row, beside] * right
-    lower = texture[below, column] * (1 - right) + texture[below, beside] * right
-    return (upper * (1 - down) + lower * down).astype(np.float32)

@@ -99,14 +99,6 @@ class Proven(NamedTuple):
         return isinstance(self.proof, Stands)
 
 
-def prove(blocks: Sequence[Block]) -> Proven | None:
-    """Return a checked proof that blocks stand or fall; None if statics cannot decide.
-
-    Nothing is proven about blocks that overlap, since they push one another apart.
-    """
-    return prove_standing(blocks) or prove_fall(blocks)
-
-
 def prove_standing(blocks: Sequence[Block]) -> Proven | None:
     """Return a checked proof that blocks stand, or None."""
     if not blocks or find_overlaps(blocks):
@@ -123,10 +115,13 @@ def prove_standing(blocks: Sequence[Block]) -> Proven | None:
     return Proven(structure, proof) if certificate.proves(proof, structure) else None
 
 
-def prove_fall(blocks: Sequence[Block]) -> Proven | None:
-    """Return a checked proof that blocks fall, or None."""
-    if not blocks or find_overlaps(blocks):
-        return None
+def prove(blocks: Sequence[Block]) -> Proven | None:
+    """Return a checked proof that blocks stand or fall; None if statics cannot decide.
+
+    Nothing is proven about blocks that overlap, since they push one another apart.
+    """
+    if (standing := prove_standing(blocks)) or not blocks or find_overlaps(blocks):
+        return standing
     wide = _contacts(blocks, -MARGIN_M)
     solution = _least_imbalance(blocks, _matrix(wide, len(blocks), _MUCH))
     motion = _exact(

@@ -251,7 +251,10 @@ def _contact_rise(first: ConvexPiece, second: ConvexPiece, axes: Axes) -> tuple[
         elif np.linalg.norm(shared - shared[0], axis=1).max() > _MIN_LENGTH_M:
             # One piece is an edge; its rim runs less than a millimeter inside the other's face.
             face = lower if len(lower) > 2 else upper
-            if _depth_inside(shared.mean(axis=0), face) >= _LINE_M:
+            sides = np.roll(face, -1, axis=0) - face
+            inward = np.stack([-sides[:, 1], sides[:, 0]], axis=1)
+            inward /= np.linalg.norm(inward, axis=1, keepdims=True)
+            if np.einsum("ij,ij->i", shared.mean(axis=0) - face, inward).min() >= _LINE_M:
                 return float(direction[2]), "edge"
             rim = float(direction[2])
     return rim, "rim"
@@ -350,14 +353,6 @@ def _inside(subject: Floats, window: Floats, inset_m: float = 0.0) -> Floats:
         outward = -along if len(window) == 2 else np.array([along[1], -along[0]])
         kept = clip(kept, (kept - start) @ outward + inset_m * np.linalg.norm(outward))
     return kept
-
-
-def _depth_inside(point: Floats, polygon: Floats) -> float:
-    """Distance of a point from the nearest side of a convex polygon [m], positive inside."""
-    sides = np.roll(polygon, -1, axis=0) - polygon
-    inward = np.stack([-sides[:, 1], sides[:, 0]], axis=1)
-    inward /= np.linalg.norm(inward, axis=1, keepdims=True)
-    return float(np.einsum("ij,ij->i", point - polygon, inward).min())
 
 
 VOXEL_M = 0.005

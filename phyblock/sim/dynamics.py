@@ -1,4 +1,4 @@
-"""Blocks released under physics: states, building orders, and plans with poses.
+"""Blocks released under physics: states, building orders, plans with poses, removals.
 
 Three facts save time. Structures that are proven to stand (`balance`) need no trial, except large
 finished ones (`check`). Blocks that are far apart cannot disturb each other, so they are tried
@@ -12,6 +12,7 @@ from __future__ import annotations
 import atexit
 import contextlib
 import functools
+import math
 import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -19,13 +20,21 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from phyblock.domain.blocks import SHAPES
 from phyblock.domain.scene import Block
 from phyblock.errors import SimulationError
-from phyblock.sim.balance import prove_standing
+from phyblock.sim.balance import FRICTIONS, MASS_FACTORS, prove_standing
 from phyblock.sim.contact import FIT_TOLERANCE_M, bounds_m, boxes_near, drop_height_m, piece_pairs
-from phyblock.sim.engine import Physics, PhysicsEngine, Pose, World, open_world, physics_engine
+from phyblock.sim.engine import (
+    GRAVITY_M_S2,
+    Physics,
+    PhysicsEngine,
+    Pose,
+    World,
+    open_world,
+    physics_engine,
+)
 from phyblock.sim.geometry import rounded, significant
 from phyblock.types import StepEnd
 
@@ -446,7 +455,17 @@ def _out_of_others(
     """Return the block moved out of others and the floor, None if too far, and the distance [m]."""
     start = place = np.array(block.position_m)
     for _ in range(_TRIES):
-        way = _way_out(block, others)
+        # The shortest way out of the deepest overlap; zero if there is none.
+        box = bounds_m(block)
+        way = np.array([0.0, 0.0, max(0.0, -float(box[0, 2]))])
+        for other in others:
+            if not boxes_near(bounds_m(other), box, 0.0):
+                continue
+            for _, _, axes in piece_pairs(other, block):
+                best = int(axes.gaps_m.argmax())
+                out = -min(axes.gaps_m[best], 0.0) * axes.directions[best]
+                if np.linalg.norm(out) > np.linalg.norm(way):
+                    way = out
         depth_m, moved_m = (float(np.linalg.norm(part)) for part in (way, place + way - start))
         if max(moved_m, depth_m) > most_m:
             return None, max(moved_m, depth_m)
@@ -458,16 +477,94 @@ def _out_of_others(
     return block, float(np.linalg.norm(place - start))
 
 
-def _way_out(block: Block, others: Sequence[Block]) -> NDArray[np.float64]:
-    """Return the shortest way out of the deepest overlap, shape (3,) [m]; zero if there is none."""
-    box = bounds_m(block)
-    deepest = np.array([0.0, 0.0, max(0.0, -float(box[0, 2]))])
-    for other in others:
-        if not boxes_near(bounds_m(other), box, 0.0):
-            continue
-        for _, _, axes in piece_pairs(other, block):
-            best = int(axes.gaps_m.argmax())
-            way = -min(axes.gaps_m[best], 0.0) * axes.directions[best]
-            if np.linalg.norm(way) > np.linalg.norm(deepest):
-                deepest = way
-    return deepest
+LEAN_DEG = 2.0
+"""Slope of the floor [degrees]; at the least friction, blocks begin to slide at 15."""
+_STILL_M, _STILL_DEG = 0.004, 4.0
+_MOVED_M, _MOVED_DEG = 0.02, 20.0
+_LONGEST_S = 5.0
+
+
+def _leaning(physics: Physics, downhill: tuple[float, float]) -> Physics:
+    """The same settings on a floor that is tilted by `LEAN_DEG` towards a unit vector (x, y)."""
+    slope = math.radians(LEAN_DEG)
+    x, y = (part * math.sin(slope) * GRAVITY_M_S2 for part in downhill)
+    return replace(physics, gravity_m_s2=(x, y, -math.cos(slope) * GRAVITY_M_S2))
+
+
+_ACROSS = math.sqrt(0.75)
+_LIGHTER, _HEAVIER = (
+    tuple((block_type, factor) for block_type, shape in SHAPES.items() if shape.is_long)
+    for factor in MASS_FACTORS
+)
+OUTCOME_SETTINGS: tuple[Physics, ...] = (
+    Physics(1 / 240, 50, 0.35),
+    _leaning(Physics(1 / 200, 50, FRICTIONS[1], mass_factors=_HEAVIER), (0.0, 1.0)),
+    _leaning(Physics(1 / 300, 80, FRICTIONS[0], mass_factors=_LIGHTER), (_ACROSS, -0.5)),
+    _leaning(Physics(1 / 480, 100, 0.35), (-_ACROSS, -0.5)),
+)
+"""Settings of every outcome of removing or adding a block; the first gives the settled poses.
+
+An outcome counts only if all settings agree and each block either stayed where it was or moved far.
+Time step, solver, friction and masses vary, and the floor is tilted slightly, each time to another
+side, because a block whose weight is exactly over an edge may stay on a level floor.
+"""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Result of a removal: orders that moved, and final poses under the first setting.
+
+    If settings do not agree with a margin, it is not clear, and the other fields are meaningless.
+    """
+
+    moved: tuple[int, ...]
+    settled: tuple[Block, ...]
+    is_clear: bool
+
+
+def after_removal(blocks: Sequence[Block], order: int) -> Outcome:
+    """The outcome of suddenly removing the block with this order."""
+    left = [block for block in blocks if block.order != order]
+    agreed: dict[int, bool | None] = {}
+    first: dict[int, Pose] = {}
+    for setting in OUTCOME_SETTINGS:
+        with open_world(setting) as world:
+            world.place(*left)
+            is_at_rest, poses = wait(world, _LONGEST_S), world.poses()
+        moved = _moved(left, poses)
+        agreed, first = agreed or moved, first or poses
+        if not is_at_rest or None in moved.values() or moved != agreed:
+            return Outcome((), (), False)
+    settled = tuple(first[b.order].put(b) if agreed[b.order] else b for b in left)
+    return Outcome(tuple(order for order, has in agreed.items() if has), settled, True)
+
+
+def holds(blocks: Sequence[Block], about: int) -> bool | None:
+    """True if all blocks near one stay where they are; None if settings, or limits, differ."""
+    near = next(group for group in groups(blocks) if any(b.order == about for b in group))
+    agreed: bool | None = None
+    for setting in OUTCOME_SETTINGS:
+        verdict: bool | None = None
+        with open_world(setting) as world:
+            world.place(*near)
+            for is_at_rest in moments(world, _LONGEST_S):
+                moved = _moved(near, world.poses()).values()
+                if is_at_rest or True in moved:
+                    verdict = False if True in moved else None if None in moved else True
+                    break
+        if verdict is None or agreed not in (None, verdict):
+            return None
+        agreed = verdict
+    return agreed
+
+
+def _moved(blocks: Sequence[Block], poses: Mapping[int, Pose]) -> dict[int, bool | None]:
+    """True for a block that moved far, False for one that stayed, None if neither is clear."""
+    found: dict[int, bool | None] = {}
+    for block in blocks:
+        start, end = Pose.goal(block), poses[block.order]
+        distance_m, angle_deg = end.distance_m(start), end.angle_deg(start)
+        is_far = distance_m > _MOVED_M or angle_deg > _MOVED_DEG
+        is_still = distance_m <= _STILL_M and angle_deg <= _STILL_DEG
+        found[block.order] = True if is_far else False if is_still else None
+    return found

@@ -95,10 +95,14 @@ class Mesh:
     def faces(self) -> NDArray[np.int64]:
         """The face of each triangle, (m,), by its first triangle: neighbors within 30 degrees."""
         number = list(range(len(self.triangles)))
-        for one, other in self._neighbors():
-            if dot(self.normals[one], self.normals[other]) > _SMOOTH_COSINE:
-                low, high = sorted((number[one], number[other]))
-                number = [low if each == high else each for each in number]
+        owner: dict[tuple[int, int], int] = {}
+        for one, (a, b, c) in enumerate(self.triangles.tolist()):
+            for start, end in ((a, b), (b, c), (c, a)):
+                owner[start, end] = one
+                other = owner.get((end, start), one)
+                if other != one and dot(self.normals[other], self.normals[one]) > _SMOOTH_COSINE:
+                    low, high = sorted((number[other], number[one]))
+                    number = [low if each == high else each for each in number]
         return np.array(number)
 
     @functools.cached_property
@@ -117,39 +121,14 @@ class Mesh:
     @functools.cached_property
     def volume_m3(self) -> float:
         """Volume of the solid [m3]."""
-        return float(self._tetrahedra_m3.sum())
+        return float((np.linalg.det(self.corners_m) / 6).sum())
 
     @functools.cached_property
     def center_of_mass_m(self) -> NDArray[np.float64]:
         """Center of mass of the solid, shape (3,) [m]."""
-        moments: NDArray[np.float64] = self._tetrahedra_m3 @ self.corners_m.sum(axis=1) / 4
+        tetrahedra_m3 = np.linalg.det(self.corners_m) / 6
+        moments: NDArray[np.float64] = tetrahedra_m3 @ self.corners_m.sum(axis=1) / 4
         return moments / self.volume_m3
-
-    @functools.cached_property
-    def inertia_m2(self) -> NDArray[np.float64]:
-        """Inertia about the center of mass for a unit mass, shape (3, 3) [m2]."""
-        centered = self.corners_m - self.center_of_mass_m
-        volumes = np.linalg.det(centered) / 6
-        sums = centered.sum(axis=1)
-        second: NDArray[np.float64] = np.einsum("t,tci,tcj->ij", volumes, centered, centered)
-        second += np.einsum("t,ti,tj->ij", volumes, sums, sums)
-        second /= 20 * self.volume_m3
-        return np.trace(second) * np.eye(3) - second
-
-    def _neighbors(self) -> list[tuple[int, int]]:
-        """Pairs of triangles that share an edge."""
-        beside: dict[tuple[int, int], int] = {}
-        pairs = []
-        for number, (a, b, c) in enumerate(self.triangles.tolist()):
-            for start, end in ((a, b), (b, c), (c, a)):
-                if (end, start) in beside:
-                    pairs.append((beside[end, start], number))
-                beside[start, end] = number
-        return pairs
-
-    @functools.cached_property
-    def _tetrahedra_m3(self) -> NDArray[np.float64]:
-        return np.linalg.det(self.corners_m) / 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,7 +149,14 @@ def solid_mesh(block_type: BlockType) -> Mesh:
 @functools.cache
 def principal_inertia_m2(block_type: BlockType) -> tuple[float, float, float]:
     """Moments of inertia of the solid about its body axes through its center, per mass [m2]."""
-    x, y, z = map(significant, np.diag(solid_mesh(block_type).inertia_m2).tolist())
+    mesh = solid_mesh(block_type)
+    centered = mesh.corners_m - mesh.center_of_mass_m
+    volumes = np.linalg.det(centered) / 6
+    sums = centered.sum(axis=1)
+    second: NDArray[np.float64] = np.einsum("t,tci,tcj->ij", volumes, centered, centered)
+    second += np.einsum("t,ti,tj->ij", volumes, sums, sums)
+    second /= 20 * mesh.volume_m3
+    x, y, z = map(significant, np.diag(np.trace(second) * np.eye(3) - second).tolist())
     return x, y, z
 
 
@@ -228,32 +214,22 @@ def collision_pieces(block_type: BlockType, inset_m: float = 0.0) -> tuple[Conve
     axis = np.array([1.0, 0.0, 0.0] if shape.axis == "x" else [0.0, 0.0, 1.0])
     pieces = []
     for part in shape.profile.parts:
-        outline = _shrunk(part, inset_m)
+        sides = np.roll(part, -1, axis=0) - part
+        outward = np.stack([sides[:, 1], -sides[:, 0]], axis=1)
+        outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+        offsets = np.einsum("ij,ij->i", outward, part) - inset_m
+        pairs = np.stack([np.roll(outward, 1, axis=0), outward], axis=1)
+        rights = np.stack([np.roll(offsets, 1), offsets], axis=1)
+        outline = np.linalg.solve(pairs, rights[..., None])[..., 0]
         vertices = np.vstack([_cap(shape, outline, along) for along in (-half_m, half_m)])
-        sides = _one_of_each_line(_cap(shape, np.roll(outline, -1, axis=0) - outline, 0.0))
-        normals = np.cross(sides, axis)
-        pieces.append(ConvexPiece(vertices, np.vstack([normals, axis]), np.vstack([sides, axis])))
+        sides = _cap(shape, np.roll(outline, -1, axis=0) - outline, 0.0)
+        edges: list[NDArray[np.float64]] = []
+        for side in sides / np.linalg.norm(sides, axis=1, keepdims=True):
+            if all(abs(side @ other) < 1 - 1e-9 for other in edges):  # Not parallel to one before.
+                edges.append(side)
+        normals = np.cross(np.array(edges), axis)
+        pieces.append(ConvexPiece(vertices, np.vstack([normals, axis]), np.vstack([edges, axis])))
     return tuple(pieces)
-
-
-def _shrunk(outline: Outline, inset_m: float) -> Outline:
-    """A convex outline with every side moved inward by `inset_m`."""
-    sides = np.roll(outline, -1, axis=0) - outline
-    normals = np.stack([sides[:, 1], -sides[:, 0]], axis=1)
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    offsets = np.einsum("ij,ij->i", normals, outline) - inset_m
-    pairs = np.stack([np.roll(normals, 1, axis=0), normals], axis=1)
-    rights = np.stack([np.roll(offsets, 1), offsets], axis=1)
-    return np.linalg.solve(pairs, rights[..., None])[..., 0]
-
-
-def _one_of_each_line(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Unit vectors, one for each set of parallel ones."""
-    kept: list[NDArray[np.float64]] = []
-    for vector in vectors / np.linalg.norm(vectors, axis=1, keepdims=True):
-        if all(abs(vector @ other) < 1 - 1e-9 for other in kept):
-            kept.append(vector)
-    return np.array(kept)
 
 
 _CM = 100.0

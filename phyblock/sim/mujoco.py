@@ -36,10 +36,8 @@ def _loaded() -> ModuleType:
     """The `mujoco` module, kept from writing MUJOCO_LOG.TXT into the working folder."""
     import mujoco
 
-    def ignore(_message: str) -> None:
-        """Do nothing: warnings are checked after each step."""
-
-    mujoco.set_mju_user_warning(ignore)
+    # Warnings are checked after each step.
+    mujoco.set_mju_user_warning(lambda _message: None)
     return cast(ModuleType, mujoco)
 
 

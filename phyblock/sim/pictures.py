@@ -1,5 +1,9 @@
 """The pictures a model sees: goal, numbered candidates, composite; and the keys they cache under.
 
+Also pictures with scales, for plans with poses: the goal on a ruled floor, and the sheet of all
+candidates. The floor has lines every centimeter, numbers every five along the two edges next to the
+camera, and named axes; a pole at the far corner marks the height.
+
 Pictures are drawn at twice the size and scaled down, so the rasterizer needs no anti-aliasing.
 Outlines are drawn where the face number of pixels changes. The same input gives the same bytes in
 every process of one machine; keys cover everything that the bytes depend on, and nothing else.
@@ -12,8 +16,8 @@ import io
 import json
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
-from typing import TypeVar
+from dataclasses import astuple, dataclass, replace
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 import PIL
@@ -329,31 +333,26 @@ def candidates_grid(
     empty = picture([], candidate_camera(cube, style), style.background, cell_px)
     grid = Image.new("RGB", (size_px, size_px))
     edges = [round(i * size_px / GRID_COLUMNS) for i in range(GRID_COLUMNS + 1)]
+    ground = GROUNDS[style.background]
     for place in range(GRID_COLUMNS**2):
         row, column = divmod(place, GRID_COLUMNS)
         box = (edges[column], edges[row], edges[column + 1], edges[row + 1])
         cell = empty
         if place < len(blocks):
             cell = thumbnail(blocks[place], style, cell_px, distance_m).copy()
-            _write_number(cell, place + 1, style.background)
+            # At the bottom of the cell; on textured floors, with a rim around it.
+            font = ImageFont.load_default(size=_LABEL_SIZE * cell_px)
+            corner = (cell_px * (1 - _LABEL_MARGIN), cell_px * (1 - _LABEL_MARGIN))
+            rim = DARK_INK if ground.ink == LIGHT_INK else LIGHT_INK
+            width = round(cell_px * _RIM) if ground.texture else 0
+            pen, text = ImageDraw.Draw(cell), str(place + 1)
+            pen.text(corner, text, ground.ink, font, "rs", stroke_width=width, stroke_fill=rim)
         grid.paste(cell.resize((box[2] - box[0], box[3] - box[1])), box[:2])
-    lines, ink = ImageDraw.Draw(grid), GROUNDS[style.background].line
+    lines, ink = ImageDraw.Draw(grid), ground.line
     for edge in edges[1:-1]:
         lines.line([(edge, 0), (edge, size_px)], fill=ink)
         lines.line([(0, edge), (size_px, edge)], fill=ink)
     return grid, blocks, distance_m
-
-
-def _write_number(cell: Image.Image, number: int, background: Background) -> None:
-    """Write the number at the bottom of the cell; on textured floors, with a rim around it."""
-    side = cell.height
-    font = ImageFont.load_default(size=_LABEL_SIZE * side)
-    place = (side * (1 - _LABEL_MARGIN), side * (1 - _LABEL_MARGIN))
-    ground = GROUNDS[background]
-    rim = DARK_INK if ground.ink == LIGHT_INK else LIGHT_INK
-    width = round(side * _RIM) if ground.texture else 0
-    pen = ImageDraw.Draw(cell)
-    pen.text(place, str(number), ground.ink, font, "rs", stroke_width=width, stroke_fill=rim)
 
 
 @functools.lru_cache(maxsize=512)
@@ -418,3 +417,224 @@ def hidden_blocks(scene: Scene) -> tuple[int, ...]:
     counts = np.bincount(seen[seen >= 0], minlength=len(scene))
     least = LEAST_SHARE * _SEEN_PX**2
     return tuple(b.order for b, n in zip(scene.blocks, counts, strict=True) if n < least)
+
+
+RULED_VERSION = 1
+"""Increased whenever the scales change, so that stored pictures are redrawn."""
+KIT_VERSION = 1
+"""Increased whenever the sheet changes, so that stored pictures are redrawn."""
+
+_CM = 100.0
+_MARGIN_CM = 3.0
+_MAJOR_CM = 5
+_RULED_WINDOW = Window(-0.93, 0.93, -0.93, 0.93)
+_LEAST_DISTANCE_M = 0.45
+_LABEL_CM, _NAME_CM = 2.0, 5.0
+_MINOR, _MAJOR = 95, 190
+_BRIGHT: tuple[Rgb, ...] = ((255, 92, 92), (96, 220, 110), (110, 170, 255))
+_DARK: tuple[Rgb, ...] = ((190, 20, 20), (10, 120, 30), (20, 60, 190))
+"""Colors of x, y and z on dark floors and on light ones."""
+_LIGHT_SUM = 380
+_TOP_DEG = 80.0
+_GROWTH = 1.5
+_TEXT, _MARGIN, _DOT = 0.105, 0.04, 0.035
+
+Point = tuple[float, float, float]
+
+
+def ruled_png(scene: Scene, style: PictureStyle) -> bytes:
+    """PNG of the goal on a ruled floor, in the view of the style; the scene must have a block."""
+    return to_png(RuledFloor(scene, style).image(scene.blocks))
+
+
+def ruled_key(scene: Scene, style: PictureStyle) -> str:
+    """SHA-256 [hex] of everything that the picture depends on."""
+    content = [RULED_VERSION, *looks(scene.blocks)]
+    return picture_key("ruled goal", style, content)
+
+
+class RuledFloor:
+    """The ruled floor of a scene, which must have a block; draws blocks from the goal's camera."""
+
+    def __init__(self, scene: Scene, style: PictureStyle) -> None:
+        field = _field(scene.blocks, style)
+        self._camera, self._style = _ruled_camera(scene.blocks, field, style), style
+        ground = empty_ground(style.background, self._camera, style.size_px)
+        size_px, ink = len(ground), GROUNDS[style.background].ink
+        rules = _Pen(self._camera, Image.new("L", (size_px, size_px)))
+        (x0, x1), (y0, y1) = field.x, field.y
+        for is_major in (False, True):
+            shade, width = (_MAJOR, 2) if is_major else (_MINOR, 1)
+            lines = [((x, y0, 0), (x, y1, 0), x) for x in range(x0, x1 + 1)]
+            lines += [((x0, y, 0), (x1, y, 0), y) for y in range(y0, y1 + 1)]
+            for start, end, at in lines:
+                if (at % _MAJOR_CM == 0) == is_major:
+                    rules.line(start, end, shade, width)
+        share = np.asarray(rules.image, dtype=np.float32)[..., None] / np.float32(255)
+        ruled = ground * (1 - share) + np.array(ink, dtype=np.float32) * share
+        written = _Pen(self._camera, Image.fromarray(np.rint(ruled).astype(np.uint8)))
+        _write(written, field, ink, has_pole=style.elevation_deg < _TOP_DEG)
+        self._ground: NDArray[np.float32] = np.array(written.image, dtype=np.float32)
+
+    def image(self, blocks: Sequence[Block]) -> Image.Image:
+        """The blocks on the floor, an RGB image of the style's size."""
+        style = self._style
+        return picture(blocks, self._camera, style.background, style.size_px, self._ground)
+
+
+class _Field(NamedTuple):
+    """The ruled rectangle [cm], and along x and y its sides next to the camera and far from it."""
+
+    x: tuple[int, int]
+    y: tuple[int, int]
+    z: int
+    near: tuple[int, int]
+    far: tuple[int, int]
+
+    def beyond(self, axis: int, by: float) -> float:
+        """A place beyond the near side of an axis."""
+        return self.near[axis] + math.copysign(by, self.near[axis] - self.far[axis])
+
+
+def _field(blocks: Sequence[Block], style: PictureStyle) -> _Field:
+    points = np.vstack([drawn_m(block) for block in blocks]) * _CM
+    low, high = rounded(points.min(axis=0)), rounded(points.max(axis=0))
+    first = [math.floor((side - _MARGIN_CM) / _MAJOR_CM) * _MAJOR_CM for side in low]
+    last = [math.ceil((side + _MARGIN_CM) / _MAJOR_CM) * _MAJOR_CM for side in high]
+    azimuth = math.radians(style.azimuth_deg)
+    # The camera is on the side of +x at azimuth 0; beside an axis, either end is suitable.
+    x, y = ((first[axis], last[axis]) for axis in (0, 1))
+    near_x, near_y = math.cos(azimuth) > -1e-6, math.sin(azimuth) > -1e-6
+    top = math.ceil((high[2] + 1) / _MAJOR_CM) * _MAJOR_CM
+    return _Field(x, y, top, (x[near_x], y[near_y]), (x[not near_x], y[not near_y]))
+
+
+def _ruled_camera(blocks: Sequence[Block], field: _Field, style: PictureStyle) -> Camera:
+    wide_x, wide_y = field.beyond(0, _NAME_CM + 1), field.beyond(1, _NAME_CM + 1)
+    marks = [(x, y, 0.0) for x in (*field.x, wide_x) for y in (*field.y, wide_y)]
+    if style.elevation_deg < _TOP_DEG:
+        marks.append((*field.far, field.z + 2.0))
+    corners = np.array(marks, dtype=np.float64) / _CM
+    points = np.vstack([*(drawn_m(block) for block in blocks), corners])
+    return frame(points, style.axes, _RULED_WINDOW, _LEAST_DISTANCE_M)
+
+
+class _Pen:
+    """Draws in a square picture at places given in centimeters."""
+
+    def __init__(self, camera: Camera, image: Image.Image) -> None:
+        self.image = image
+        self._camera, self._size_px = camera, image.width
+        self._draw = ImageDraw.Draw(image)
+
+    def along(self, place: Point, by: float) -> Point:
+        """The place at a distance to the right of another in the picture, at the same height."""
+        right_x, right_y, _ = self._camera.axes[0].tolist()
+        return (place[0] + right_x * by, place[1] + right_y * by, place[2])
+
+    def pixel(self, place: Point) -> tuple[float, float]:
+        """The pixel of a place."""
+        column, row = self._camera.to_pixels(np.array([place]) / _CM, self._size_px)[0]
+        return round(float(column), 3), round(float(row), 3)
+
+    def line(self, start: Point, end: Point, ink: int | Rgb, width: int) -> None:
+        """A straight line."""
+        self._draw.line([self.pixel(start), self.pixel(end)], fill=ink, width=width)
+
+    def text(self, place: Point, text: str, ink: Rgb, size_cm: float) -> None:
+        """Draw a text of about this height, but readable, with its center at a place."""
+        per_cm = math.dist(self.pixel(place), self.pixel(self.along(place, 1)))
+        size = min(max(size_cm * per_cm, 0.024 * self._size_px), 0.05 * self._size_px)
+        font = ImageFont.load_default(size=round(size, 2))
+        rim = (0, 0, 0) if sum(ink) > _LIGHT_SUM else (255, 255, 255)
+        self._draw.text(
+            self.pixel(place), text, ink, font, anchor="mm", stroke_width=2, stroke_fill=rim
+        )
+
+
+def _write(pen: _Pen, field: _Field, ink: Rgb, *, has_pole: bool) -> None:
+    """Draw axes through the origin, names and numbers, and the pole."""
+    x_ink, y_ink, z_ink = _DARK if sum(ink) < _LIGHT_SUM else _BRIGHT
+    (x0, x1), (y0, y1) = field.x, field.y
+    if y0 <= 0 <= y1:
+        pen.line((x0, 0, 0), (x1, 0, 0), x_ink, 2 * SUPERSAMPLE)
+    if x0 <= 0 <= x1:
+        pen.line((0, y0, 0), (0, y1, 0), y_ink, 2 * SUPERSAMPLE)
+    beside_y, beside_x = field.beyond(1, _LABEL_CM), field.beyond(0, _LABEL_CM)
+    for x in range(x0, x1 + 1, _MAJOR_CM):
+        pen.text((x, beside_y, 0), str(x), x_ink if x else ink, 1.9)
+    for y in range(y0, y1 + 1, _MAJOR_CM):
+        pen.text((beside_x, y, 0), str(y), y_ink if y else ink, 1.9)
+    pen.text(((x0 + x1) / 2, field.beyond(1, _NAME_CM), 0), "x", x_ink, 2.8)
+    pen.text((field.beyond(0, _NAME_CM), (y0 + y1) / 2, 0), "y", y_ink, 2.8)
+    if has_pole:
+        x, y = field.far
+        pen.line((x, y, 0), (x, y, field.z), z_ink, SUPERSAMPLE)
+        for z in range(1, field.z + 1):
+            long = 0.9 if z % _MAJOR_CM == 0 else 0.4
+            pen.line(pen.along((x, y, z), -long), pen.along((x, y, z), long), z_ink, SUPERSAMPLE)
+            if z % _MAJOR_CM == 0:
+                pen.text(pen.along((x, y, z), 2.4), str(z), z_ink, 1.9)
+        pen.text((x, y, field.z + 1.6), "z", z_ink, 2.2)
+
+
+def written_style(style: PictureStyle) -> PictureStyle:
+    """The style of pictures with text: half as large again, so that it is readable."""
+    return replace(style, size_px=min(math.ceil(style.size_px * _GROWTH), LARGEST_PX))
+
+
+def kit_png(candidates: CandidateSet, style: PictureStyle) -> bytes:
+    """PNG of `kit_sheet`."""
+    return to_png(kit_sheet(candidates, style))
+
+
+def kit_sheet(candidates: CandidateSet, style: PictureStyle) -> Image.Image:
+    """Every candidate with its number, its dimensions, and a dot at the center of its box."""
+    sheet, blocks, distance_m = candidates_grid(candidates, style)
+    draw, side = ImageDraw.Draw(sheet), style.size_px / GRID_COLUMNS
+    font = ImageFont.load_default(size=_TEXT * side)
+    for place, block in enumerate(blocks):
+        row, column = divmod(place, GRID_COLUMNS)
+        points = drawn_m(block) * _CM
+        low, high = points.min(axis=0), points.max(axis=0)
+        sides = zip("xyz", (high - low).tolist(), strict=True)
+        sizes = (f"{name} {round(side_cm, 1):g}" for name, side_cm in sides)
+        left, foot = column * side + _MARGIN * side, row * side + side * (1 - _MARGIN)
+        ink = GROUNDS[style.background].ink
+        draw.text((left, foot), ", ".join(sizes), ink, font, anchor="ls")
+        camera, middle = candidate_camera(block, style, distance_m), ((low + high) / 2 / _CM)[None]
+        x, y = camera.to_pixels(middle, round(side))[0].tolist()
+        x, y = column * side + x, row * side + y
+        for radius, fill in ((_DOT * side, "white"), (_DOT * side * 0.6, "black")):
+            draw.ellipse((x - radius, y - radius, x + radius, y + radius), fill=fill)
+    return sheet
+
+
+def kit_key(candidates: CandidateSet, style: PictureStyle) -> str:
+    """SHA-256 [hex] of everything that the sheet depends on."""
+    content = [astuple(candidate) for candidate in candidates.candidates]
+    return picture_key("kit", style, [KIT_VERSION, "common", *content])
+
+
+_STEP_MS, _END_MS = 650, 2200
+
+
+def assembly_gif(scene: Scene, style: PictureStyle) -> bytes:
+    """Return the assembly in the stored order as an animated GIF, which repeats.
+
+    Every frame has the camera of the goal. Raises DataError if that order is not valid.
+    """
+    camera = goal_camera(scene, style)
+    if not scene.graph.is_valid(range(len(scene))):
+        message = "places a block before one that it depends on"
+        raise DataError(Problem(scene.id, message, "order of blocks"))
+    counts, shown = range(1, len(scene) + 1), (camera, style.background, style.size_px)
+    images = [picture(scene.blocks[:n], *shown) for n in counts]
+    # The palette is made of the first frame, the middle one and the last.
+    colorful = Image.fromarray(np.concatenate([images[0], images[len(images) // 2], images[-1]]))
+    palette = colorful.quantize(256, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+    images = [one.quantize(palette=palette, dither=Image.Dither.NONE) for one in images]
+    buffer, times_ms = io.BytesIO(), [_STEP_MS] * (len(images) - 1) + [_END_MS]
+    more = {"save_all": True, "append_images": images[1:], "loop": 0, "disposal": 1}
+    images[0].save(buffer, "GIF", duration=times_ms, optimize=False, **more)
+    return buffer.getvalue()

@@ -167,35 +167,7 @@ def _label_places(centers: Sequence[Point], radius: float, size_px: int) -> list
         angle, far = math.radians(angle_deg), distance * radius
         return center[0] + far * math.cos(angle), center[1] - far * math.sin(angle)
 
-    chosen = [beside(center, 90, 2.1) for center in centers]
-    for _ in range(_ROUNDS):
-        before = list(chosen)
-        for number, center in enumerate(centers):
-            labels = [place for i, place in enumerate(chosen) if i != number]
-            targets = [other for i, other in enumerate(centers) if i != number]
-            options = []
-            for far, index in product(range(len(_DISTANCES)), range(len(_ANGLES_DEG))):
-                place = beside(center, _ANGLES_DEG[index], _DISTANCES[far])
-                cost = _cost(center, place, labels, targets, radius, size_px)
-                # Distance from the target costs, and so does a place that is not above it.
-                options.append((cost + (10 * far + index), place))
-            chosen[number] = min(options)[1]
-        if chosen == before:
-            break
-    return chosen
-
-
-def _cost(
-    center: Point,
-    place: Point,
-    labels: Sequence[Point],
-    targets: Sequence[Point],
-    radius: float,
-    size_px: int,
-) -> float:
-    """Cost of a label's place on an edge, a label or a target, or of its line on one."""
-
-    def from_line(point: Point) -> float:
+    def from_line(point: Point, center: Point, place: Point) -> float:
         """Distance from the line between target and label."""
         along = (place[0] - center[0], place[1] - center[1])
         length = math.hypot(*along)
@@ -203,16 +175,32 @@ def _cost(
         share = min(1.0, max(0.0, inside / length**2))
         return math.dist(point, (center[0] + share * along[0], center[1] + share * along[1]))
 
-    cost = 0.0
-    if not all(1.2 * radius <= one <= size_px - 1.2 * radius for one in place):
-        cost += 4 * _BLOCKED
-    for label in labels:
-        cost += 3 * _BLOCKED * (math.dist(place, label) < 2.5 * radius)
-        cost += 2 * _BLOCKED * (from_line(label) < 1.3 * radius)
-    for target in targets:
-        cost += 2 * _BLOCKED * (math.dist(place, target) < 1.9 * radius)
-        cost += _BLOCKED * (from_line(target) < 0.7 * radius)
-    return cost
+    def cost(number: int, place: Point) -> float:
+        """Cost of a label's place on an edge, a label or a target, or of its line on one."""
+        center, whole = centers[number], 0.0
+        if not all(1.2 * radius <= one <= size_px - 1.2 * radius for one in place):
+            whole += 4 * _BLOCKED
+        for label in chosen[:number] + chosen[number + 1 :]:
+            whole += 3 * _BLOCKED * (math.dist(place, label) < 2.5 * radius)
+            whole += 2 * _BLOCKED * (from_line(label, center, place) < 1.3 * radius)
+        for target in (*centers[:number], *centers[number + 1 :]):
+            whole += 2 * _BLOCKED * (math.dist(place, target) < 1.9 * radius)
+            whole += _BLOCKED * (from_line(target, center, place) < 0.7 * radius)
+        return whole
+
+    chosen = [beside(center, 90, 2.1) for center in centers]
+    for _ in range(_ROUNDS):
+        before = list(chosen)
+        for number, center in enumerate(centers):
+            options = []
+            for far, index in product(range(len(_DISTANCES)), range(len(_ANGLES_DEG))):
+                place = beside(center, _ANGLES_DEG[index], _DISTANCES[far])
+                # Distance from the target costs, and so does a place that is not above it.
+                options.append((cost(number, place) + (10 * far + index), place))
+            chosen[number] = min(options)[1]
+        if chosen == before:
+            break
+    return chosen
 
 
 @functools.lru_cache(maxsize=48)
@@ -271,30 +259,11 @@ def block_mark(recipe: QuestionPicture, shot: Shot, order: int, letter: str) -> 
         return None
     rows, columns = np.nonzero(last)
     middle = np.argmin((rows - rows.mean()) ** 2 + (columns - columns.mean()) ** 2)
-    pixel = (int(rows[middle]), int(columns[middle]))
-    hit = _hit(drawn_blocks(recipe)[vertex], question_camera(recipe, _STYLE), pixel)
-    return None if hit is None else Mark(letter, hit)
-
-
-def mark_pixel(recipe: QuestionPicture, position_m: tuple[float, float, float]) -> tuple[int, int]:
-    """The pixel (row, column) of `SEEN_PX` at a point of the world, the nearest one inside."""
-    column, row = question_camera(recipe, _STYLE).to_pixels(np.array([position_m]), SEEN_PX)[0]
-    return int(np.clip(row, 0, SEEN_PX - 1)), int(np.clip(column, 0, SEEN_PX - 1))
-
-
-def seen_order(
-    recipe: QuestionPicture, shot: Shot, position_m: tuple[float, float, float]
-) -> int | None:
-    """Order of the block that is visible at a point of the world; None for the floor."""
-    vertex = int(shot.block[mark_pixel(recipe, position_m)])
-    return recipe.blocks[vertex].order if vertex >= 0 else None
-
-
-def _hit(block: Block, camera: Camera, pixel: tuple[int, int]) -> tuple[float, float, float] | None:
-    """Return where the ray through a pixel first meets the block (Moeller-Trumbore), or None."""
+    # Where the ray through that pixel first meets the block (Moeller-Trumbore).
+    block, camera = drawn_blocks(recipe)[vertex], question_camera(recipe, _STYLE)
     half = camera.half_tangent
-    across = ((pixel[1] + 0.5) / SEEN_PX * 2 - 1) * half
-    up = (1 - (pixel[0] + 0.5) / SEEN_PX * 2) * half
+    across = ((int(columns[middle]) + 0.5) / SEEN_PX * 2 - 1) * half
+    up = (1 - (int(rows[middle]) + 0.5) / SEEN_PX * 2) * half
     ray = camera.axes[0] * across + camera.axes[1] * up + camera.axes[2]
     corners = drawn_m(block)[drawn_mesh(block.type).triangles]
     one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
@@ -312,4 +281,18 @@ def _hit(block: Block, camera: Camera, pixel: tuple[int, int]) -> tuple[float, f
         return None
     nearest = int(np.argmin(np.where(met, away, np.inf)))
     x, y, z = (round(float(part), 4) + 0.0 for part in camera.eye_m + away[nearest] * ray)
-    return x, y, z
+    return Mark(letter, (x, y, z))
+
+
+def mark_pixel(recipe: QuestionPicture, position_m: tuple[float, float, float]) -> tuple[int, int]:
+    """The pixel (row, column) of `SEEN_PX` at a point of the world, the nearest one inside."""
+    column, row = question_camera(recipe, _STYLE).to_pixels(np.array([position_m]), SEEN_PX)[0]
+    return int(np.clip(row, 0, SEEN_PX - 1)), int(np.clip(column, 0, SEEN_PX - 1))
+
+
+def seen_order(
+    recipe: QuestionPicture, shot: Shot, position_m: tuple[float, float, float]
+) -> int | None:
+    """Order of the block that is visible at a point of the world; None for the floor."""
+    vertex = int(shot.block[mark_pixel(recipe, position_m)])
+    return recipe.blocks[vertex].order if vertex >= 0 else None

@@ -84,13 +84,15 @@ def draw(props: Sequence[Prop], camera: Camera, light: Light, size_px: int) -> R
         nothing = np.full((size_px, size_px), NOTHING)
         return Raster(rgb, nothing, nothing, nothing != NOTHING)
     solid = _solids(props)
-    front = solid[dot(solid.normals, solid.anchor_m - camera.eye_m) < 0]
+    away = dot(solid.normals, solid.anchor_m - camera.eye_m)
+    front = solid[away < 0]
+    planes = screen.linear(front.normals / away[away < 0][:, None])
     corners_px, owner = screen.corners_px(front.corners_m)
     covering = _spans(corners_px, size_px)
     covering = covering._replace(triangle=owner[covering.triangle])
-    triangle, nearness = _nearest(
-        covering, screen.planes(front), size_px, screen.least, screen.most
-    )
+    # From the far plane to the near one, or to the nearest depth that can be drawn.
+    ends = 1 / camera.far_m, 1 / max(camera.near_m, _LEAST_DEPTH_M)
+    triangle, nearness = _nearest(covering, planes, size_px, *ends)
     colors = np.array([prop.rgb for prop in props], dtype=np.float64)
     look = _Look(colors, solid, front, screen, light)
     prop, face = (np.full((size_px, size_px), NOTHING) for _ in range(2))
@@ -153,16 +155,6 @@ class _CameraScreen:
     camera: Camera
     size_px: int
 
-    @property
-    def least(self) -> float:
-        """Nearness of the far plane."""
-        return 1 / self.camera.far_m
-
-    @property
-    def most(self) -> float:
-        """Nearness of the near plane, or of the nearest depth that can be drawn."""
-        return 1 / max(self.camera.near_m, _LEAST_DEPTH_M)
-
     def linear(self, vectors: Floats) -> Floats:
         """Scalar product of vectors (n, 3) with the ray through a pixel's center, as (n, 3)."""
         right, up, forward = turned(vectors, self.camera.axes).T
@@ -170,11 +162,6 @@ class _CameraScreen:
         middle = (1 - self.size_px) / 2
         across, down = right * step, -up * step
         return np.stack([across, down, (across + down) * middle + forward], axis=1)
-
-    def planes(self, triangles: _Solids) -> Floats:
-        """Nearness of each triangle's plane, linear over the screen, shape (n, 3)."""
-        away = dot(triangles.normals, triangles.anchor_m - self.camera.eye_m)
-        return self.linear(triangles.normals / away[:, None])
 
     def corners_px(self, corners_m: Floats) -> tuple[Floats, Ints]:
         """Triangles (n, 3, 3) [m] cut at the least depth, on screen (k, 3, 2), and their owners."""
@@ -296,7 +283,11 @@ class _Look:
         self._light, self._map = light, None
         # The cosine to the light is computed at corners, and interpolated between them.
         cosines = dot(front.bends, light.direction)
-        gradient = _gradient(front.corners_m, cosines)
+        one, two = (front.corners_m[:, i] - front.corners_m[:, 0] for i in (1, 2))
+        normal = cross(one, two)
+        rise_one, rise_two = (cosines[:, i, None] - cosines[:, :1] for i in (1, 2))
+        gradient = rise_one * cross(two, normal) + rise_two * cross(normal, one)
+        gradient /= dot(normal, normal)[:, None]
         self._is_bent = np.ptp(cosines, axis=1) > 0
         self._cosine = cosines[:, 0]
         self._start = cosines[:, 0]
@@ -328,16 +319,6 @@ class _Look:
         return np.rint(colors, out=colors)
 
 
-def _gradient(corners_m: Floats, values: Floats) -> Floats:
-    """Gradient (n, 3) in its plane of values (n, 3) at a triangle's corners."""
-    one, two = (corners_m[:, i] - corners_m[:, 0] for i in (1, 2))
-    normal = cross(one, two)
-    rise_one, rise_two = (values[:, i, None] - values[:, :1] for i in (1, 2))
-    gradient = rise_one * cross(two, normal) + rise_two * cross(normal, one)
-    gradient /= dot(normal, normal)[:, None]
-    return gradient
-
-
 class _LightMap:
     """The picture from the light, `size_px` squared: shadows of props on props.
 
@@ -357,7 +338,12 @@ class _LightMap:
         self._low_m = low - _MARGIN_PX * self._pixel_m
         self._size_px = size_px
         backs = solid[dot(solid.normals, direction) < _AWAY]
-        planes = self._planes_of(backs)
+        # Nearness of each triangle's plane, linear over the screen.
+        right, up, towards = turned(backs.normals, self._axes).T
+        a, b = -right / towards * self._pixel_m, -up / towards * self._pixel_m
+        level = dot(backs.normals, backs.anchor_m) / towards
+        level += (a * self._low_m[0] + b * self._low_m[1]) / self._pixel_m
+        planes = np.stack([a, b, level + (a + b) / 2], axis=1)
         covering = _spans(self.places(backs.corners_m)[..., :2], size_px)
         shown, _ = _nearest(covering, planes, size_px, -np.inf, np.inf)
         same = np.ones(shown.shape, dtype=np.bool_)
@@ -366,14 +352,6 @@ class _LightMap:
         self._shown, self._same = shown.ravel(), same.ravel()
         # Empty pixels cast no shadow.
         self._planes = np.vstack([planes, [0.0, 0.0, -np.inf]]).T.copy()
-
-    def _planes_of(self, triangles: _Solids) -> Floats:
-        """Nearness of each triangle's plane, linear over the screen, shape (n, 3)."""
-        right, up, towards = turned(triangles.normals, self._axes).T
-        a, b = -right / towards * self._pixel_m, -up / towards * self._pixel_m
-        level = dot(triangles.normals, triangles.anchor_m) / towards
-        level += (a * self._low_m[0] + b * self._low_m[1]) / self._pixel_m
-        return np.stack([a, b, level + (a + b) / 2], axis=1)
 
     def places(self, points_m: Floats) -> Floats:
         """Column, row and height towards the light of points (..., 3) [m], on the last axis."""

@@ -39,8 +39,7 @@ from phyblock.sim.contact import voxel_iou
 from phyblock.sim.dynamics import ExecutionLimits, execute, execution_physics, groups
 from phyblock.sim.engine import Pose, described_engine
 from phyblock.sim.geometry import box_height_cm, center_cm, origin_m, put
-from phyblock.sim.pictures import goal_style
-from phyblock.sim.ruled import kit_key, kit_png, ruled_key, ruled_png, written_style
+from phyblock.sim.pictures import goal_style, kit_key, kit_png, ruled_key, ruled_png, written_style
 from phyblock.text import plain_sum
 from phyblock.tracks.base import CARRYING, ENGINE, Judgement, SceneTrack
 from phyblock.tracks.full_planning import PlanParse, PlanSubject, needed_candidate

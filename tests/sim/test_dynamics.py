@@ -13,9 +13,16 @@ from hypothesis import strategies as st
 from phyblock.making.scenes.sketch import POSES
 from phyblock.sim import dynamics
 from phyblock.sim.contact import drop_height_m
-from phyblock.sim.dynamics import DEFAULT_TRIAL, ONE_SETTING, check, check_steps, settle
+from phyblock.sim.dynamics import (
+    DEFAULT_TRIAL,
+    ONE_SETTING,
+    after_removal,
+    check,
+    check_steps,
+    holds,
+    settle,
+)
 from phyblock.sim.engine import Pose, open_world
-from phyblock.sim.outcomes import after_removal, holds
 from tests.shipped import TASKS
 from tests.sim.structures import block, built, counterweighted_beam, tower
 

@@ -18,11 +18,11 @@ from phyblock.domain.scene import Candidate, CandidateSet, Scene
 from phyblock.errors import DataError
 from phyblock.making.scenes.candidates import make_candidates
 from phyblock.making.scenes.sketch import POSES
-from phyblock.sim import pictures, ruled
+from phyblock.sim import pictures
 from phyblock.sim.backgrounds import GROUNDS
 from phyblock.sim.camera import Window, frame, view_axes
 from phyblock.sim.engine import Pose, quat_xyzw_to_euler_deg
-from phyblock.sim.film import assembly_gif
+from phyblock.sim.pictures import assembly_gif, kit_key, ruled_key
 from phyblock.sim.question_pictures import (
     block_mark,
     drawn_blocks,
@@ -34,7 +34,6 @@ from phyblock.sim.question_pictures import (
     seen_order,
     state_picture,
 )
-from phyblock.sim.ruled import kit_key, ruled_key
 from phyblock.types import BACKGROUNDS
 from tests.shipped import TASKS
 from tests.sim.structures import block, clouds, scene_of, tower
@@ -265,8 +264,8 @@ def test_a_state_is_seen_as_the_goal_is_and_changes_where_a_block_comes():
 def test_all_that_is_ruled_and_written_is_in_the_picture(places, azimuth_deg, elevation_deg):
     blocks = [block(n, "cube", place) for n, place in enumerate(places, 1)]
     style = replace(SMALL, azimuth_deg=azimuth_deg, elevation_deg=elevation_deg)
-    field = ruled._field(blocks, style)
-    camera = ruled._camera(blocks, field, style)
+    field = pictures._field(blocks, style)
+    camera = pictures._ruled_camera(blocks, field, style)
     beyond = [(*field.x, field.beyond(0, 5)), (*field.y, field.beyond(1, 5)), (0.0,)]
     ends = np.array([*itertools.product(*beyond)])
     assert np.abs(camera.project(ends / 100)).max() <= 1

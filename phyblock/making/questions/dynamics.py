@@ -36,9 +36,8 @@ from phyblock.sim.contact import (
     whole_bounds_m,
 )
 from phyblock.sim.contact import at as at_place
-from phyblock.sim.dynamics import groups
+from phyblock.sim.dynamics import LEAN_DEG, after_removal, groups, holds
 from phyblock.sim.geometry import corners_m
-from phyblock.sim.outcomes import LEAN_DEG, after_removal, holds
 from phyblock.sim.question_pictures import is_inside, mark_pixel, seen, shown_pixels
 
 Ints = NDArray[np.int64]
