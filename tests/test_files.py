@@ -23,6 +23,7 @@ from phyblock.files import (
     write_named,
 )
 from tests.fuzz.strategies import PICTURES, chunk, encoded, png_header
+from tests.workspace import problem_of
 
 
 @given(st.binary() | st.text())
@@ -158,9 +159,7 @@ def test_four_formats_are_read(format_name, tmp_path):
 def test_a_bad_picture_is_refused(data, told, tmp_path):
     path = tmp_path / "pic.png"
     path.write_bytes(data)
-    with pytest.raises(DataError) as caught:
-        read_picture(path)
-    (problem,) = caught.value.problems
+    problem = problem_of(DataError, read_picture, path)
     assert problem.where == str(path)
     assert told in str(problem)
     assert problem.allowed

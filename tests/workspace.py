@@ -18,10 +18,12 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
+import pytest
 import yaml
 from click.testing import CliRunner, Result
 
 from phyblock.domain.question import CATEGORIES, LETTERS, SUBTASKS
+from phyblock.errors import PhyblockError, Problem
 from tests.fork_server import ONE_THREAD, Done, Forked, run_forked
 
 Raw = dict[str, Any]
@@ -68,6 +70,14 @@ def invoked(*words: object, **env: str) -> Result:
     return runner.invoke(
         phyblock, [*map(str, words)], standalone_mode=False, catch_exceptions=False
     )
+
+
+def problem_of(error: type[PhyblockError], work: Callable[..., object], *args: object) -> Problem:
+    """Return the one problem that a call is refused for."""
+    with pytest.raises(error) as caught:
+        work(*args)
+    (problem,) = caught.value.problems
+    return problem
 
 
 def plan_text(*numbers: int) -> str:

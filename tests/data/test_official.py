@@ -21,6 +21,7 @@ from phyblock.data.scenes import read_builtin
 from phyblock.errors import DataError
 from phyblock.results.paper import published_table
 from tests.data.broken import sound_scene, with_value, write_checkout, write_scenes
+from tests.workspace import problem_of
 
 SCENE = {**sound_scene(), "levels": [3], "parents": ["s1"]}
 
@@ -192,9 +193,7 @@ def test_each_fault_is_one_error_with_file_and_place(tmp_path, towers, name, con
     with pytest.raises(DataError, match="holds no question files"):
         read_official_questions(tmp_path, towers)
     (tmp_path / name).write_text(content if content == "{" else json.dumps(content))
-    with pytest.raises(DataError) as caught:
-        read_official_questions(tmp_path, towers)
-    (problem,) = caught.value.problems
+    problem = problem_of(DataError, read_official_questions, tmp_path, towers)
     assert str(problem).startswith(f"{tmp_path / name}{said}")
 
 

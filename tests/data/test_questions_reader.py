@@ -12,7 +12,7 @@ from phyblock.domain.scene import Block
 from phyblock.errors import DataError
 from tests.data.broken import sound_scene, with_value, without, write_scenes
 from tests.fuzz.strategies import QUESTIONS, sound_question
-from tests.workspace import tower, write_lines
+from tests.workspace import problem_of, tower, write_lines
 
 QUESTION = sound_question("s1") | {"id": "co-001"}
 
@@ -94,9 +94,7 @@ BROKEN = [
 def test_what_is_wrong_is_named_with_its_line(tmp_path, scenes, at, value, field, found):
     broken = with_value(QUESTION | {"id": "co-002"}, at, value)
     folder = write(tmp_path / "q", QUESTION, broken)
-    with pytest.raises(DataError) as caught:
-        read_questions(folder, scenes)
-    (problem,) = caught.value.problems
+    problem = problem_of(DataError, read_questions, folder, scenes)
     assert problem.where == f"{folder / 'questions.jsonl'}:2"
     assert (problem.field, problem.found) == (field, found)
 

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.domain.blocks import KIT_PALETTE
-from phyblock.domain.scene import MAX_CANDIDATES, Block, Candidate, CandidateSet, Plan, Scene
+from phyblock.domain.scene import MAX_CANDIDATES, Block, Candidate, Plan, Scene
 from phyblock.errors import DataError
 from phyblock.making.scenes.candidates import NEEDED, make_candidates
 from phyblock.making.scenes.production import Request, draw, shares
@@ -22,7 +22,6 @@ GAIN = 0.02
 """What a learner may win without seeing the goal: what is left is chance."""
 DEVIATIONS = 4.0
 """Of a binomial count, for every one of the some thirty that are looked at."""
-Tasks = list[tuple[Scene, CandidateSet]]
 
 
 def scene_of(looks):

@@ -118,10 +118,6 @@ FLOATING = {
 }
 
 
-def checks_of(findings):
-    return {finding.check for finding in findings}
-
-
 @pytest.mark.parametrize("is_whole", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_annotation_errors_of_the_official_data_are_reported(official_checkout, is_whole):
     some = ("000", "001", "040", "069", "187")
@@ -136,7 +132,9 @@ def test_annotation_errors_of_the_official_data_are_reported(official_checkout, 
         found = dict(zip((s.id for s, _ in pairs), workers.map(verify, pairs), strict=True))
 
     def having(*names):
-        return {name for name, one in found.items() if checks_of(one) & set(names)}
+        return {
+            name for name, one in found.items() if {finding.check for finding in one} & {*names}
+        }
 
     assert having("overlap") == OVERLAPPING & found.keys()
     assert having("floating") == having("unstable") == FLOATING & found.keys()

@@ -30,7 +30,8 @@ from tests.data.broken import (
 from tests.documents import ROOT
 from tests.fuzz.strategies import sound_question
 from tests.shipped import DATA, TASKS, built_in_questions
-from tests.web.factory import manifest
+from tests.web.factory import JSON, manifest
+from tests.workspace import problem_of
 
 SCENES = Path("phyblock-400", "scenes.jsonl")
 QUESTIONS = Path("phyblock-vqa", "questions.jsonl")
@@ -55,9 +56,7 @@ def test_shipped_scenes_and_questions_are_written_byte_for_byte():
 def test_a_line_may_say_its_version_and_none_is_from_the_future(kind, raw):
     for line in (raw, {**raw, "format": 1}):
         assert json.loads(validated(kind, line, "here").as_json()) == line
-    with pytest.raises(DataError) as caught:
-        validated(kind, {**raw, "format": 2}, "here")
-    (problem,) = caught.value.problems
+    problem = problem_of(DataError, validated, kind, {**raw, "format": 2}, "here")
     assert (problem.field, problem.found, problem.allowed) == ("format", "2", "1")
 
 
@@ -128,14 +127,7 @@ def test_lines_of_the_first_version_are_written_again_byte_for_byte(line):
     assert whole(line) == line
 
 
-json_values = st.recursive(
-    st.none() | st.booleans() | st.integers(-(10**9), 10**9) | st.text(max_size=4),
-    lambda below: st.lists(below, max_size=2) | st.dictionaries(st.text(max_size=3), below),
-    max_leaves=5,
-)
-
-
-@given(st.dictionaries(st.text("xyz", min_size=1, max_size=3), json_values, max_size=3))
+@given(st.dictionaries(st.text("xyz", min_size=1, max_size=3), JSON, max_size=3))
 def test_what_no_model_declares_is_kept(more):
     record = plan_record()
     line = json.dumps(record | more, ensure_ascii=False, separators=(",", ":")).encode()
@@ -146,9 +138,7 @@ def test_what_no_model_declares_is_kept(more):
 def test_a_damaged_line_is_named_with_its_field(tmp_path, name):
     line, field, says = DAMAGED[name]
     sound = lines_before()[0]
-    with pytest.raises(StoreError) as caught:
-        load_run(folder_with(tmp_path, sound, line, sound))
-    (problem,) = caught.value.problems
+    problem = problem_of(StoreError, load_run, folder_with(tmp_path, sound, line, sound))
     assert problem.where.startswith(f"{tmp_path / 'records.jsonl'}:2")
     assert problem.message.startswith("is not a record")
     assert problem.hint

@@ -8,7 +8,7 @@ from phyblock.records.record import Call
 from phyblock.results.load import load_run
 from phyblock.run.rescore import rescore
 from tests.data.broken import YAML_TEXTS, plan_record
-from tests.workspace import call
+from tests.workspace import call, problem_of
 
 IDENTITY = "5eed" * 16
 
@@ -91,8 +91,6 @@ def test_records_that_were_copied_in_are_not_counted(runs, tmp_path, reader):
     with path.open("ab") as file:
         file.write((runs.root / "other" / "records.jsonl").read_bytes())
     before = path.read_bytes()
-    with pytest.raises(StoreError) as caught:
-        reader(folder)
-    (problem,) = caught.value.problems
+    problem = problem_of(StoreError, reader, folder)
     assert (problem.where, problem.field) == (f"{path}:6", "run")
     assert path.read_bytes() == before

@@ -3,7 +3,6 @@
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -16,8 +15,6 @@ from phyblock.results.compare import compare, sensitivity_frame, sensitivity_tab
 from phyblock.results.figures import sensitivity
 from phyblock.results.text import number
 from tests.web.factory import LEVELS, laws, manifest, record, record_lists, run_of, score
-
-Records = list[dict[str, Any]]
 
 
 def plans(model, right, seeds=(0,)):

@@ -12,6 +12,7 @@ from phyblock.errors import PromptError
 from phyblock.models.request import Image, Message
 from phyblock.tracks.prompts import OfficialPrompt, TemplatePrompt
 from tests.fuzz.strategies import TEMPLATES
+from tests.workspace import problem_of
 
 GOAL, GRID = Image(b"goal", "goal", 8, 8), Image(b"grid", "candidates", 8, 8)
 FACTS = {"pictures": ["goal", "candidates"], "n_candidates": 16, "candidate_scale": "common"}
@@ -82,9 +83,7 @@ def test_an_edit_is_another_prompt(tmp_path_factory, first, second):
 )  # fmt: skip
 def test_what_is_wrong_is_said_with_file_and_line(tmp_path, body, where, said):
     (tmp_path / "secret.txt").write_text("secret", encoding="utf-8")
-    with pytest.raises(PromptError) as caught:
-        prompt(tmp_path, body).messages((), FACTS)
-    (problem,) = caught.value.problems
+    problem = problem_of(PromptError, lambda: prompt(tmp_path, body).messages((), FACTS))
     assert said in problem.message
     assert where in problem.where
 

@@ -44,12 +44,8 @@ async def ask(track, *keys, seed=0):
     return [await track.request(item, seed, {}, with_messages=True) for item in shown]
 
 
-def user_parts(request):
-    return request.messages[-1].parts
-
-
 def images(request):
-    return [part for part in user_parts(request) if isinstance(part, Image)]
+    return [part for part in request.messages[-1].parts if isinstance(part, Image)]
 
 
 def test_the_answer_stands_in_no_message(question_set, shop):

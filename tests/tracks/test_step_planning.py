@@ -62,8 +62,8 @@ def baseline(name):
     return ask
 
 
-def play(task, agent, track=None, seed=0):
-    episode = (track or made(**OPEN)).start(task, seed, {}, with_messages=False)
+def play(task, agent, track=None, seed=0, *, with_messages=False):
+    episode = (track or made(**OPEN)).start(task, seed, {}, with_messages=with_messages)
 
     async def requests():
         asked = []
@@ -252,21 +252,17 @@ def test_feedback_tells_no_more_than_it_may(feedback):
 def test_pictures_of_states_are_drawn_and_kept(tmp_path):
     """An episode sees one picture a state; a second episode finds them all."""
 
-    async def play(track, task):
-        episode = track.start(task, 0, {}, with_messages=True)
-        seen = []
-        while (request := await episode.request()) is not None:
-            seen.append([p.data for p in request.messages[1].parts if isinstance(p, Image)])
-            move = request.subject.valid[0]
-            episode.take(Reply(text=f"Move({move})"))
-        return seen
+    def right_move(request):
+        return f"Move({request.subject.valid[0]})"
 
     found, task = [], TASKS[0]
     for expected in (2 + len(task.scene), 0):
         shop = Workshop(1, tmp_path)
         images = {"layout": "separate"}
         track = track_of("step_planning", [task], shop, images=images, steps={"physics": "settle"})
-        found.append(asyncio.run(play(track, task)))
+        _, asked = play(task, right_move, track, with_messages=True)
+        parts = [request.messages[1].parts for request in asked]
+        found.append([[part.data for part in seen if isinstance(part, Image)] for seen in parts])
         assert shop.rendered == expected
         outlines = list(track.outlines(task))
         are_real = [all(one.data for one in outline.images) for outline in outlines]

@@ -1,6 +1,5 @@
 """Manifests and records for the tests of tables."""
 
-import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -14,10 +13,16 @@ from phyblock.records.record import Reply
 from phyblock.results.load import Run, design_of, frames_of
 from phyblock.scoring.plan import BLOCK_OUTCOMES, ERROR_TYPES
 from phyblock.types import OUTCOMES
+from tests.workspace import write_lines
 
 laws = settings(max_examples=8)
 """Tables take some 50 ms each, so that few examples must do."""
 
+JSON = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.text(),
+    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(), inner, max_size=4),
+    max_leaves=12,
+)
 LEVELS = {"000": (1, 2), "001": (2,), "002": (3,), "003": (4,), "004": (1,)}
 
 
@@ -124,8 +129,7 @@ def run_of(records: Iterable[Mapping[str, Any]], facts: Mapping[str, Any]) -> Ru
 def write_run(folder: Path, records: Iterable[Mapping[str, Any]], facts: Mapping[str, Any]) -> Path:
     folder.mkdir(exist_ok=True)
     (folder / "run.yaml").write_text(yaml.safe_dump(dict(facts)), encoding="utf-8")
-    lines = (json.dumps(one, ensure_ascii=False) + "\n" for one in records)
-    (folder / "records.jsonl").write_text("".join(lines), encoding="utf-8")
+    write_lines(folder / "records.jsonl", records)
     return folder
 
 

@@ -22,13 +22,9 @@ from phyblock.web.board import SiteRun, Sources, board_of, entries_of
 from phyblock.web.leaderboard import check_runs, write_site
 from phyblock.web.pack import Pack, pack_samples
 from phyblock.web.report import write_report
-from tests.web.factory import laws, manifest, record, record_lists, run_of, score, write_run
+from tests.web.factory import JSON, laws, manifest, record, record_lists, run_of, score, write_run
+from tests.workspace import files_below, problem_of
 
-JSON = st.recursive(
-    st.none() | st.booleans() | st.integers() | st.text(),
-    lambda inner: st.lists(inner, max_size=4) | st.dictionaries(st.text(), inner, max_size=4),
-    max_leaves=12,
-)
 SCENES = [str(number) for number in range(12)]
 
 
@@ -156,11 +152,6 @@ def test_boards_say_what_tables_say(made):
                 assert shown == [None if math.isnan(n) else round(n, 4) for n in wanted]
 
 
-def tree(folder):
-    files = (path for path in folder.rglob("*") if path.is_file())
-    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
-
-
 def data_of(made):
     return [made.root / "data", made.root / "questions"]
 
@@ -170,8 +161,8 @@ def test_runs_and_bundles_become_one_folder_the_same_every_time(made, tmp_path):
     found = write_site(paths, tmp_path / "a", data_of(made))
     assert (found.models, found.samples, found.lacking) == (4, 104, "")
     write_site(paths, tmp_path / "b", data_of(made))
-    assert tree(tmp_path / "a") == tree(tmp_path / "b")
-    assert str(made.root).encode() not in b"".join(tree(tmp_path / "a").values())
+    assert files_below(tmp_path / "a") == files_below(tmp_path / "b")
+    assert str(made.root).encode() not in b"".join(files_below(tmp_path / "a").values())
     replays = [e for path in (tmp_path / "a").glob("data/*/records-*.js") for e in unpacked(path)]
     shown, added = set().union(*replays), set()
     for fields in read_records(made.root / "first"):
@@ -278,9 +269,7 @@ def test_runs_that_differ_in_what_decides_are_refused_with_what_differs(change, 
     first = site_run("one", **shown({}, "a"))
     first.run.manifest.tracks["full_planning"]["carrying"] = 1
     other = site_run("two", **change)
-    with pytest.raises(SpecError) as caught:
-        check_runs([first, other])
-    (problem,) = caught.value.problems
+    problem = problem_of(SpecError, check_runs, [first, other])
     assert (problem.where, problem.field) == ("two", field)
 
 
@@ -304,7 +293,7 @@ def test_a_build_that_was_stopped_never_looks_whole_and_what_is_not_ours_stays(
     later, out, new = [made.root / "later"], tmp_path / "site", tmp_path / "new"
     write_site(later, out, title="One")
     (out / "CNAME").write_text("example.org")
-    before = tree(out)
+    before = files_below(out)
 
     def stopped(*_, **__):
         raise KeyboardInterrupt
@@ -315,11 +304,11 @@ def test_a_build_that_was_stopped_never_looks_whole_and_what_is_not_ours_stays(
             with pytest.raises(KeyboardInterrupt):
                 write_site(later, place, title="Two")
     assert not (new / "index.html").exists()
-    left = tree(out)
+    left = files_below(out)
     assert all(left[name] == before[name] for name in before if name != ".generated")
     for place in (new, out):
         write_site(later, place, title="Two")
-    assert tree(out).keys() == {*tree(new), "CNAME"}
+    assert files_below(out).keys() == {*files_below(new), "CNAME"}
     assert "<title>Two" in (out / "index.html").read_text(encoding="utf-8")
 
 
