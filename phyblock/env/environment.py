@@ -143,13 +143,13 @@ class _BlockPlay:
     def right_moves(self) -> tuple[int, ...]:
         return self._assembly.right_moves()
 
-    def image(self, blocks: tuple[Block, ...]) -> Image.Image:
+    def image(self, blocks: tuple[Block, ...] | None) -> Image.Image:
+        """Blocks in the world, or the candidates for None."""
+        if blocks is None:
+            return candidates_grid(self.candidates, self._style)[0]
         if self._lookout is None:
             self._lookout = Lookout(self._scene, self._style)
         return self._lookout.image(blocks)
-
-    def candidates_image(self) -> Image.Image:
-        return candidates_grid(self.candidates, self._style)[0]
 
     def info(self) -> dict[str, Any]:
         blocks, swapped = self._scene.blocks, self._move.swapped if self._move else ()
@@ -235,13 +235,13 @@ class _PosePlay:
                 moves.append({"block": np.int64(number), "center_m": center})
         return tuple(moves)
 
-    def image(self, blocks: tuple[Block, ...]) -> Image.Image:
+    def image(self, blocks: tuple[Block, ...] | None) -> Image.Image:
+        """Blocks in the world, or the candidates for None."""
+        if blocks is None:
+            return kit_sheet(self.candidates, self._style)
         if self._floor is None:
             self._floor = RuledFloor(self._scene, goal_style(self._scene, self._style))
         return self._floor.image(blocks)
-
-    def candidates_image(self) -> Image.Image:
-        return kit_sheet(self.candidates, self._style)
 
     def info(self) -> dict[str, Any]:
         last = asdict(self._last or ExecutedStep("no_block"))
@@ -467,9 +467,7 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
     def _picture(self, blocks: tuple[Block, ...] | None) -> NDArray[np.uint8]:
         """A picture of blocks, or of the candidates, from a cache of the last ones used."""
         if blocks not in self._pictures:
-            play = self._play
-            drawn = play.candidates_image() if blocks is None else play.image(blocks)
-            self._pictures[blocks] = np.asarray(drawn.reduce(self._shrink))
+            self._pictures[blocks] = np.asarray(self._play.image(blocks).reduce(self._shrink))
             if len(self._pictures) > _KEPT_PICTURES:
                 self._pictures.popitem(last=False)
         self._pictures.move_to_end(blocks)

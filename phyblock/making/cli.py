@@ -48,7 +48,6 @@ from phyblock.making.scenes.candidates import make_candidates
 from phyblock.making.scenes.completing import complete, palette_of, read_given
 from phyblock.making.scenes.production import Production, builtin_forms, shares
 from phyblock.making.scenes.sketch import PALETTES, Palette, colorless
-from phyblock.sim.camera import VIEWS
 from phyblock.sim.engine import described_engine, other_engine
 from phyblock.sim.pictures import (
     RENDER_VERSION,
@@ -61,6 +60,7 @@ from phyblock.sim.pictures import (
     visible_shares,
 )
 from phyblock.sim.question_pictures import question_png
+from phyblock.sim.raster import VIEWS
 from phyblock.text import counted, did_you_mean, hex_digest
 from phyblock.tracks.difficulty import MEASURES
 from phyblock.types import BACKGROUNDS

@@ -273,12 +273,6 @@ def most_placed(goal: Goal, plan: Plan) -> int:
     return max(mask.bit_count() for mask in frontier)
 
 
-def count_errors(errors: Iterable[ErrorType | None]) -> dict[ErrorType, int]:
-    """Number of wrong steps of each type, all four types present."""
-    counted = Counter(error for error in errors if error is not None)
-    return {name: counted[name] for name in ERROR_TYPES}
-
-
 def level1_counts(goal: Goal, plan: Plan, criterion: Level1Criterion) -> Counts:
     """Counts of `plan` without order, under the goal's setting.
 
@@ -351,12 +345,23 @@ def _most_standing(
         value = sum(min((look & standing).bit_count(), n) for look, n in exact.items())
         if value <= best:
             return
-        some, surplus = _too_many(goal, standing, exact, spare)
-        if not some:
+        # For each kind, the blocks of which too few are named, and how many must be removed.
+        surplus: dict[int, int] = {}
+        blocks: dict[int, int] = {}
+        for look, kind in goal.kind_of_look.items():
+            excess = (look & standing).bit_count() - exact.get(look, 0)
+            if excess > 0:
+                surplus[kind] = surplus.get(kind, -spare.get(kind, 0)) + excess
+                blocks[kind] = blocks.get(kind, 0) | look & standing
+        needed = [kind for kind in blocks if surplus[kind] > 0]
+        if not needed:
             best = value
             return
+        # A kind of which all must be removed comes first.
+        whole = [kind for kind in needed if surplus[kind] == blocks[kind].bit_count()]
+        some = blocks[whole[0] if whole else needed[-1]]
         above = [goal.graph.above[v] & standing for v in range(len(goal.graph)) if some >> v & 1]
-        if surplus == len(above):
+        if whole:
             search(standing & ~functools.reduce(operator.or_, above))
             return
         for gone in sorted(above, key=int.bit_count):
@@ -365,29 +370,6 @@ def _most_standing(
 
     search((1 << len(goal.graph)) - 1)
     return best
-
-
-def _too_many(
-    goal: Goal, standing: int, exact: Mapping[int, int], spare: Mapping[int, int]
-) -> tuple[int, int]:
-    """Return the blocks of a kind of which too few are named, and how many must be removed.
-
-    (0, 0) if all can stand. A kind of which all must be removed comes first.
-    """
-    surplus: dict[int, int] = {}
-    blocks: dict[int, int] = {}
-    for look, kind in goal.kind_of_look.items():
-        excess = (look & standing).bit_count() - exact.get(look, 0)
-        if excess > 0:
-            surplus[kind] = surplus.get(kind, -spare.get(kind, 0)) + excess
-            blocks[kind] = blocks.get(kind, 0) | look & standing
-    needed = (0, 0)
-    for kind, some in blocks.items():
-        if surplus[kind] == some.bit_count():
-            return some, surplus[kind]
-        if surplus[kind] > 0:
-            needed = some, surplus[kind]
-    return needed
 
 
 def steps_kept(goal: Goal, plan: Plan, at_least: int = 0) -> int:
@@ -470,20 +452,15 @@ class AssemblyScorer:
         self._scene = scene
         self._goals = {setting: Goal(scene, candidates, setting) for setting in settings}
         # Models and seeds often give the same plan.
-        self._kept = functools.lru_cache(_PLANS_KEPT)(self._scores)
+        self.score = functools.lru_cache(_PLANS_KEPT)(self._score)
 
-    def score(
-        self, plan: Plan, matchers: Sequence[Matcher], level1: Level1Criterion | None
+    def _score(
+        self, plan: Plan, matchers: tuple[Matcher, ...], level1: Level1Criterion | None
     ) -> tuple[Score, ...]:
         """Return scores by setting, then matcher; Level-1 criteria only for scenes of level 1.
 
         Raises KeyError for a step that names no candidate.
         """
-        return self._kept(plan, tuple(matchers), level1)
-
-    def _scores(
-        self, plan: Plan, matchers: tuple[Matcher, ...], level1: Level1Criterion | None
-    ) -> tuple[Score, ...]:
         scores: list[Score] = []
         for setting, goal in self._goals.items():
             matches = [match_plan(goal, plan, matcher) for matcher in matchers]
@@ -491,9 +468,10 @@ class AssemblyScorer:
             kept = steps_kept(goal, plan, max(placed))
             outcomes = block_outcomes(goal, plan, placed)
             for matcher, match, blocks in zip(matchers, matches, outcomes, strict=True):
+                errors = {name: match.errors.count(name) for name in ERROR_TYPES}
                 scores.append(
                     Score(**vars(match.counts), criterion="aov", setting=setting, matcher=matcher,
-                          errors=count_errors(match.errors), placed=match.vertices,
+                          errors=errors, placed=match.vertices,
                           why=match.errors, blocks=blocks, kept=kept)
                 )  # fmt: skip
             if level1 is not None and 1 in self._scene.levels:

@@ -178,11 +178,6 @@ class Motion:
     turn_rad: float = 0.0
     shift_cm: tuple[float, float] = (0.0, 0.0)
 
-    def place(self) -> tuple[float, ...]:
-        """Return numbers that identify a motion, equal for turns that differ by full circles."""
-        parts = (math.cos(self.turn_rad), math.sin(self.turn_rad), *self.shift_cm)
-        return tuple(round(part, _PLACE_DIGITS) + 0.0 for part in parts)
-
 
 @dataclass(frozen=True, eq=False)
 class Alignment:
@@ -225,7 +220,10 @@ class Alignment:
                 pairs = [(s, v) for s, v in enumerate(assigned(near)) if v is not None]
                 within = sum(int(near.within[pair]) for pair in pairs)
                 far = plain_sum(min(float(near.distance_cm[pair]), FARTHEST_CM) for pair in pairs)
-                rank = (float(within), -round(far, _FAR_DIGITS), *motion.place())
+                # Turns that differ by full circles are equal.
+                turned = (math.cos(motion.turn_rad), math.sin(motion.turn_rad), *motion.shift_cm)
+                place = (round(part, _PLACE_DIGITS) + 0.0 for part in turned)
+                rank = (float(within), -round(far, _FAR_DIGITS), *place)
                 if rank in ranked:
                     break
                 ranked[rank] = motion

@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageFilter
 
-from phyblock.sim.camera import Camera
-from phyblock.sim.raster import Rgb
+from phyblock.sim.raster import Camera, Rgb
 from phyblock.types import BACKGROUNDS, Background
 
 Grid = NDArray[np.float32]  # One number a texel or pixel, shape (n, n).
@@ -110,10 +109,6 @@ def _hashed(seed: int, count: int) -> NDArray[np.float64]:
     return (mixed >> np.uint64(11)) / float(1 << 53)
 
 
-def _white(_camera: Camera, size_px: int) -> NDArray[np.float32]:
-    return np.full((size_px, size_px, 3), 255.0, dtype=np.float32)
-
-
 def _checkerboard(camera: Camera, size_px: int) -> NDArray[np.float32]:
     down, distance = _to_floor(camera, size_px)
     parity = np.zeros(distance.shape, dtype=np.int64)
@@ -154,7 +149,9 @@ class Ground:
 _LIGHT_WOOD = functools.partial(_wood, (232, 204, 164), (196, 156, 110), 11)
 _DARK_WOOD = functools.partial(_wood, (112, 76, 52), (62, 39, 27), 21)
 GROUNDS: dict[Background, Ground] = {
-    "white": Ground(0.16, DARK_INK, (205, 208, 214), INK_RGB, _white),
+    "white": Ground(
+        0.16, DARK_INK, (205, 208, 214), INK_RGB, lambda _, n: np.full((n, n, 3), np.float32(255))
+    ),
     "checkerboard": Ground(0.5, LIGHT_INK, (62, 80, 100), (206, 212, 222), _checkerboard),
     "light-wood": Ground(0.3, DARK_INK, (138, 104, 70), INK_RGB, texture=_LIGHT_WOOD),
     "dark-wood": Ground(0.5, LIGHT_INK, (150, 116, 88), (240, 234, 226), texture=_DARK_WOOD),
@@ -183,7 +180,22 @@ def floor(background: Background, camera: Camera, size_px: int) -> NDArray[np.fl
     wide = distance * np.float32(camera.width_m(1.0) / size_px)
     footprint: NDArray[np.float32] = np.divide(wide, np.sqrt(np.maximum(down, np.float32(1e-6))))
     footprint[distance <= 0] = PERIOD_M
-    return sample(background, x, y, footprint)
+    maps = surface_map(background)
+    texel_m = PERIOD_M / _SIZE
+    # The nearest power of two: borders are half way between powers, and need no logarithm.
+    borders = np.sqrt(2.0) * texel_m * np.ldexp(1.0, np.arange(len(maps) - 1))
+    level = np.searchsorted(borders.astype(np.float32), footprint).astype(np.int8)
+    colors = np.empty((*x.shape, 3), dtype=np.float32)
+    for number in np.unique(level).tolist():
+        chosen, texture, size = level == number, maps[number], len(maps[number])
+        across, along = (place[chosen] / PERIOD_M * size - 0.5 for place in (x, y))
+        column, row = np.floor(across).astype(np.int64), np.floor(along).astype(np.int64)
+        right, lower = (across - column)[:, None], (along - row)[:, None]
+        column, row, beside, below = (n % size for n in (column, row, column + 1, row + 1))
+        first = texture[row, column] * (1 - right) + texture[row, beside] * right
+        second = texture[below, column] * (1 - right) + texture[below, beside] * right
+        colors[chosen] = (first * (1 - lower) + second * lower).astype(np.float32)
+    return colors
 
 
 def shadow(background: Background, shaded: NDArray[np.bool_]) -> NDArray[np.float32]:
@@ -202,24 +214,3 @@ def surface_map(background: Background) -> tuple[NDArray[np.uint8], ...]:
     while (half := len(maps[-1]) // 2) > 0:
         maps.append(maps[-1].reshape(half, 2, half, 2, 3).mean(axis=(1, 3)))
     return tuple(np.rint(one).astype(np.uint8) for one in maps)
-
-
-def sample(background: Background, x_m: Grid, y_m: Grid, footprint_m: Grid) -> NDArray[np.float32]:
-    """Colors of a texture at points, shape (..., 3), no finer than the pixel's footprint [m]."""
-    maps = surface_map(background)
-    texel_m = PERIOD_M / _SIZE
-    # The nearest power of two: borders are half way between powers, and need no logarithm.
-    borders = np.sqrt(2.0) * texel_m * np.ldexp(1.0, np.arange(len(maps) - 1))
-    level = np.searchsorted(borders.astype(np.float32), footprint_m).astype(np.int8)
-    colors = np.empty((*x_m.shape, 3), dtype=np.float32)
-    for number in np.unique(level).tolist():
-        chosen = level == number
-        texture, size = maps[number], len(maps[number])
-        across, along = (place[chosen] / PERIOD_M * size - 0.5 for place in (x_m, y_m))
-        column, row = np.floor(across).astype(np.int64), np.floor(along).astype(np.int64)
-        right, down = (across - column)[:, None], (along - row)[:, None]
-        column, row, beside, below = (n % size for n in (column, row, column + 1, row + 1))
-        upper = texture[row, column] * (1 - right) + texture[row, beside] * right
-        lower = texture[below, column] * (1 - right) + texture[below, beside] * right
-        colors[chosen] = (upper * (1 - down) + lower * down).astype(np.float32)
-    return colors

@@ -28,10 +28,21 @@ from phyblock.domain.blocks import SHAPES, BlockType, Color, Euler, euler_deg_to
 from phyblock.domain.scene import Block, CandidateSet, Scene
 from phyblock.errors import DataError, Problem
 from phyblock.sim.backgrounds import DARK_INK, GROUNDS, INK_RGB, LIGHT_INK, floor, shadow
-from phyblock.sim.camera import VIEWS, Camera, Window, frame, view_axes
 from phyblock.sim.engine import Pose
 from phyblock.sim.geometry import dot, drawn_mesh, rounded, turned
-from phyblock.sim.raster import RASTER_VERSION, Light, Prop, Raster, Rgb, draw
+from phyblock.sim.raster import (
+    RASTER_VERSION,
+    VIEWS,
+    Camera,
+    Light,
+    Prop,
+    Raster,
+    Rgb,
+    Window,
+    draw,
+    frame,
+    view_axes,
+)
 from phyblock.text import hex_digest
 from phyblock.types import BACKGROUNDS, Background, View
 

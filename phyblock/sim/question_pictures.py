@@ -20,7 +20,6 @@ from PIL import Image, ImageDraw, ImageFont
 
 from phyblock.domain.question import Mark, QuestionPicture
 from phyblock.domain.scene import Block, Scene
-from phyblock.sim.camera import Camera, Window
 from phyblock.sim.geometry import drawn_mesh
 from phyblock.sim.pictures import (
     RENDER_VERSION,
@@ -36,6 +35,7 @@ from phyblock.sim.pictures import (
     shoot,
     to_png,
 )
+from phyblock.sim.raster import HALF_TANGENT, Camera, Window
 from phyblock.text import hex_digest
 
 QUESTION_RENDER_VERSION = 2
@@ -70,7 +70,7 @@ def question_png(recipe: QuestionPicture, style: PictureStyle) -> bytes:
     camera = question_camera(recipe, style)
     ground = recipe.background or style.background
     image = picture(drawn_blocks(recipe), camera, ground, style.size_px)
-    return to_png(_with_marks(image, recipe.marks, camera))
+    return to_png(_with_marks(image, recipe.marks, camera) if recipe.marks else image)
 
 
 @functools.lru_cache(maxsize=48)
@@ -120,8 +120,6 @@ def question_key(recipe: QuestionPicture, style: PictureStyle) -> str:
 
 def _with_marks(image: Image.Image, marks: Sequence[Mark], camera: Camera) -> Image.Image:
     """The picture (square, RGB) with each mark's target, line and label drawn over it."""
-    if not marks:
-        return image
     size_px = image.width
     angles = np.linspace(0, 2 * math.pi, 25)[:-1]
     circle = np.stack([np.cos(angles), np.sin(angles), np.zeros(len(angles))], axis=1)
@@ -261,9 +259,8 @@ def block_mark(recipe: QuestionPicture, shot: Shot, order: int, letter: str) -> 
     middle = np.argmin((rows - rows.mean()) ** 2 + (columns - columns.mean()) ** 2)
     # Where the ray through that pixel first meets the block (Moeller-Trumbore).
     block, camera = drawn_blocks(recipe)[vertex], question_camera(recipe, _STYLE)
-    half = camera.half_tangent
-    across = ((int(columns[middle]) + 0.5) / SEEN_PX * 2 - 1) * half
-    up = (1 - (int(rows[middle]) + 0.5) / SEEN_PX * 2) * half
+    across = ((int(columns[middle]) + 0.5) / SEEN_PX * 2 - 1) * HALF_TANGENT
+    up = (1 - (int(rows[middle]) + 0.5) / SEEN_PX * 2) * HALF_TANGENT
     ray = camera.axes[0] * across + camera.axes[1] * up + camera.axes[2]
     corners = drawn_m(block)[drawn_mesh(block.type).triangles]
     one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]

@@ -1,4 +1,4 @@
-"""The rasterizer: triangles to pixels in numpy, with shadows, the same bytes on every machine.
+"""Cameras, and the rasterizer: triangles to pixels in numpy, the same bytes on every machine.
 
 All triangles are scanned at once: each row of pixels that a triangle crosses is a span. The nearest
 triangle of each pixel is found by its nearness, a number that is linear over the screen (the
@@ -7,7 +7,8 @@ inverse of depth for a camera; the height towards a distant light).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from typing import NamedTuple
 
@@ -15,9 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from phyblock.domain.blocks import quat_xyzw_to_matrix
-from phyblock.sim.camera import Camera
 from phyblock.sim.engine import Pose
 from phyblock.sim.geometry import Mesh, cross, dot, rounded, turned, unit
+from phyblock.types import View
 
 RASTER_VERSION = "1"  # Increased whenever the same props give other pixels.
 NOTHING = -1  # The triangle of a pixel that shows none.
@@ -26,6 +27,111 @@ Rgb = tuple[int, int, int]  # Red, green and blue, 0..255.
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
+
+FIELD_OF_VIEW_DEG = 30.0  # Vertical and horizontal field of view; pictures are square.
+HALF_TANGENT = round(math.tan(math.radians(FIELD_OF_VIEW_DEG / 2)), 12)
+"""Half the visible width at a depth, as a share of that depth."""
+_DEPTH_MARGIN_M = 0.02
+_NEARER = 0.9
+_LEAST_DRAWN_M = 0.05  # Least distance from the camera of points that are drawn but not framed.
+
+VIEWS: dict[View, tuple[float, float]] = {
+    "oblique": (45.0, 22.0),
+    "front": (0.0, 18.0),
+    "side": (90.0, 18.0),
+    "top": (0.0, 90.0),
+}
+"""Azimuth (0 looks from +x, 90 from +y) and elevation of the named views [degrees]."""
+
+
+class Window(NamedTuple):
+    """Part of a picture in normalized coordinates: -1..1 from left to right, bottom to top."""
+
+    left: float
+    right: float
+    bottom: float
+    top: float
+
+    def scaled(self, factor: float) -> Window:
+        """The window shrunk or grown about its center."""
+        x, y = (self.left + self.right) / 2, (self.bottom + self.top) / 2
+        half_x, half_y = (self.right - self.left) / 2, (self.top - self.bottom) / 2
+        half_x, half_y = half_x * factor, half_y * factor
+        return Window(x - half_x, x + half_x, y - half_y, y + half_y)
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """A perspective camera at `eye_m` (3,) [m]; `axes` rows right, up, forward (world)."""
+
+    eye_m: NDArray[np.float64]
+    axes: NDArray[np.float64]
+    near_m: float
+    far_m: float
+
+    def project(self, points_m: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Normalized picture coordinates of world points (n, 3), shape (n, 2)."""
+        right, up, depth = turned(points_m - self.eye_m, self.axes).T
+        seen: NDArray[np.float64] = np.stack([right, up], axis=1) / depth[:, None]
+        seen /= HALF_TANGENT
+        return seen
+
+    def to_pixels(self, points_m: NDArray[np.float64], size_px: int) -> NDArray[np.float64]:
+        """Pixel coordinates (column, row), row 0 on top, of world points (n, 3), shape (n, 2)."""
+        return (self.project(points_m) * [1.0, -1.0] + 1.0) * (size_px / 2)
+
+    def ray_component(self, axis: int, size_px: int) -> NDArray[np.float32]:
+        """One world component of the ray of unit depth through each pixel, (size, size)."""
+        steps = ((np.arange(size_px) + 0.5) / size_px * 2 - 1) * HALF_TANGENT
+        right, up, forward = self.axes[:, axis]
+        across, down = steps * right + forward, steps * up
+        return np.subtract.outer(-down, -across).astype(np.float32)
+
+    def width_m(self, depth_m: float) -> float:
+        """Visible width at a depth [m]."""
+        return 2 * depth_m * HALF_TANGENT
+
+
+def view_axes(azimuth_deg: float, elevation_deg: float) -> NDArray[np.float64]:
+    """Right, up and forward of a view from that direction, rows of a (3, 3) array."""
+    azimuth, elevation = math.radians(azimuth_deg), math.radians(elevation_deg)
+    flat = math.cos(elevation)
+    towards = np.array([flat * math.cos(azimuth), flat * math.sin(azimuth), math.sin(elevation)])
+    right = np.array([-math.sin(azimuth), math.cos(azimuth), 0.0])
+    return rounded(np.stack([right, np.cross(towards, right), -towards]))
+
+
+def frame(
+    points_m: NDArray[np.float64],
+    axes: NDArray[np.float64],
+    window: Window,
+    min_distance_m: float = 0.0,
+    drawn_m: NDArray[np.float64] | None = None,
+) -> Camera:
+    """The closest camera with these axes that sees all points (n, 3), one at least, in the window.
+
+    For given axes, "every point lies inside this window" is a set of linear inequalities in the
+    camera's position, so the closest camera is a closed form. It stays at least `min_distance_m`
+    [m] from the nearest point. `drawn_m` (k, 3) are all drawn points, if they are more: they may
+    lie outside of the window, but between the camera's planes.
+    """
+    right, up, forward = turned(points_m, axes).T
+    spans = []
+    for across, low, high in ((right, window.left, window.right), (up, window.bottom, window.top)):
+        low_slope, high_slope = low * HALF_TANGENT, high * HALF_TANGENT
+        most = float(np.max(across - high_slope * forward))
+        least = float(np.min(across - low_slope * forward))
+        spans.append((most, least, low_slope, high_slope))
+    limits = [(least - most) / (high - low) for most, least, low, high in spans]
+    depth = min(*limits, float(forward.min()) - min_distance_m)
+    if drawn_m is not None and len(drawn_m):
+        forward = np.append(forward, dot(drawn_m, axes[2]))
+        depth = min(depth, float(forward.min()) - _LEAST_DRAWN_M)
+    center = [(most + least + (high + low) * depth) / 2 for most, least, low, high in spans]
+    eye = rounded(turned(np.array([*center, depth]), axes.T))
+    near_m, far_m = float(forward.min()) - depth, float(forward.max()) - depth
+    return Camera(eye, axes, near_m * _NEARER, far_m + _DEPTH_MARGIN_M)
+
 
 _AT_ONCE = 1 << 16
 """Pixels that are processed together, so that their memory is reused."""
@@ -93,17 +199,17 @@ def draw(props: Sequence[Prop], camera: Camera, light: Light, size_px: int) -> R
     # From the far plane to the near one, or to the nearest depth that can be drawn.
     ends = 1 / camera.far_m, 1 / max(camera.near_m, _LEAST_DEPTH_M)
     triangle, nearness = _nearest(covering, planes, size_px, *ends)
-    colors = np.array([prop.rgb for prop in props], dtype=np.float64)
-    look = _Look(colors, solid, front, screen, light)
     prop, face = (np.full((size_px, size_px), NOTHING) for _ in range(2))
     pixels = np.flatnonzero(triangle != NOTHING)
+    shown = triangle.ravel()[pixels]
+    prop.ravel()[pixels], face.ravel()[pixels] = front.prop[shown], front.face[shown]
+    bright = _brightness(solid, front, screen, light)
+    colors = np.array([one.rgb for one in props], dtype=np.float64)[front.prop]
     for start in range(0, len(pixels), _AT_ONCE):
-        part = pixels[start : start + _AT_ONCE]
-        shown = triangle.ravel()[part]
+        part, which = pixels[start : start + _AT_ONCE], shown[start : start + _AT_ONCE]
         row, column = np.divmod(part, size_px)
-        points = _Points(column * 1.0, row * 1.0, 1 / nearness.ravel()[part])
-        rgb.reshape(-1, 3)[part] = look.colors(shown, points)
-        prop.ravel()[part], face.ravel()[part] = front.prop[shown], front.face[shown]
+        share = bright(which, column * 1.0, row * 1.0, 1 / nearness.ravel()[part])
+        rgb.reshape(-1, 3)[part] = np.rint(np.minimum(colors[which] * share[:, None], 255.0))
     return Raster(rgb, prop, face, _ground_shadow(solid, light.direction, screen))
 
 
@@ -158,7 +264,7 @@ class _CameraScreen:
     def linear(self, vectors: Floats) -> Floats:
         """Scalar product of vectors (n, 3) with the ray through a pixel's center, as (n, 3)."""
         right, up, forward = turned(vectors, self.camera.axes).T
-        step = 2 * self.camera.half_tangent / self.size_px
+        step = 2 * HALF_TANGENT / self.size_px
         middle = (1 - self.size_px) / 2
         across, down = right * step, -up * step
         return np.stack([across, down, (across + down) * middle + forward], axis=1)
@@ -174,7 +280,7 @@ class _CameraScreen:
             owners.append(np.full(len(parts), number))
         points = np.concatenate(kept)
         middle = self.size_px / 2
-        scale = middle / self.camera.half_tangent
+        scale = middle / HALF_TANGENT
         column = points[..., 0] / points[..., 2] * scale + middle
         row = middle - points[..., 1] / points[..., 2] * scale
         return np.stack([column, row], axis=-1), np.concatenate(owners)
@@ -255,68 +361,43 @@ def _nearest(
     return shown.reshape(size_px, size_px), best.reshape(size_px, size_px)
 
 
-class _Points(NamedTuple):
-    """Visible points of pixels, each (n,): their column and row, and the depth [m]."""
+def _brightness(
+    solid: _Solids, front: _Solids, screen: _CameraScreen, light: Light
+) -> Callable[[NDArray[np.int32], Floats, Floats, Floats], Floats]:
+    """A function from points of triangles in `front` of a camera to the share of their color.
 
-    column: Floats
-    row: Floats
-    depth_m: Floats
+    It takes the triangle, column, row and depth [m] of each visible point, (n,), in a light that
+    `solid` shades.
+    """
+    # The cosine to the light is computed at corners, and interpolated between them.
+    cosines = dot(front.bends, light.direction)
+    one, two = (front.corners_m[:, i] - front.corners_m[:, 0] for i in (1, 2))
+    normal = cross(one, two)
+    rise_one, rise_two = (cosines[:, i, None] - cosines[:, :1] for i in (1, 2))
+    gradient = rise_one * cross(two, normal) + rise_two * cross(normal, one)
+    gradient /= dot(normal, normal)[:, None]
+    is_bent, eye_m = np.ptp(cosines, axis=1) > 0, screen.camera.eye_m
+    start = cosines[:, 0] + dot(gradient, eye_m - front.corners_m[:, 0])
+    slope = screen.linear(gradient).T
+    if light.diffuse:
+        shadows = _LightMap(solid, light.direction, round(screen.size_px * _LIGHT_SCREEN))
+        ways = list(zip(shadows.places(eye_m), screen.linear(shadows.steps), strict=True))
 
-    def some(self, chosen: Ints) -> _Points:
-        return _Points(self.column[chosen], self.row[chosen], self.depth_m[chosen])
+    def bright(shown: NDArray[np.int32], column: Floats, row: Floats, depth_m: Floats) -> Floats:
+        def linear(chosen: Ints, start: Floats, slope: Floats) -> Floats:
+            """The sum start + depth * (a * column + b * row + c) for `slope` (3,) or (3, n)."""
+            a, b, c = slope
+            return (a * column[chosen] + (b * row[chosen] + c)) * depth_m[chosen] + start
 
-    def linear(self, start: Floats, slope: Floats) -> Floats:
-        """The sum start + depth * (a * column + b * row + c) for `slope` (3,) or (3, n)."""
-        a, b, c = slope
-        total: Floats = (a * self.column + (b * self.row + c)) * self.depth_m
-        total += start
-        return total
-
-
-class _Look:
-    """Colors of the triangles in `front` of a camera, in a light that `solid` shades."""
-
-    def __init__(
-        self, rgb: Floats, solid: _Solids, front: _Solids, screen: _CameraScreen, light: Light
-    ) -> None:
-        self._rgb = rgb[front.prop]
-        self._light, self._map = light, None
-        # The cosine to the light is computed at corners, and interpolated between them.
-        cosines = dot(front.bends, light.direction)
-        one, two = (front.corners_m[:, i] - front.corners_m[:, 0] for i in (1, 2))
-        normal = cross(one, two)
-        rise_one, rise_two = (cosines[:, i, None] - cosines[:, :1] for i in (1, 2))
-        gradient = rise_one * cross(two, normal) + rise_two * cross(normal, one)
-        gradient /= dot(normal, normal)[:, None]
-        self._is_bent = np.ptp(cosines, axis=1) > 0
-        self._cosine = cosines[:, 0]
-        self._start = cosines[:, 0]
-        self._start = self._start + dot(gradient, screen.camera.eye_m - front.corners_m[:, 0])
-        self._slope = screen.linear(gradient).T
+        share: Floats = cosines[:, 0][shown]
+        bent = np.flatnonzero(is_bent[shown])
+        share[bent] = linear(bent, start[shown[bent]], slope[:, shown[bent]])
         if light.diffuse:
-            self._map = _LightMap(solid, light.direction, round(screen.size_px * _LIGHT_SCREEN))
-            steps = screen.linear(self._map.steps)
-            eye = self._map.places(screen.camera.eye_m)
-            self._map_places = list(zip(eye, steps, strict=True))
+            to_light = np.flatnonzero(share > 0)
+            share[to_light] *= shadows.lit(*(linear(to_light, *way) for way in ways))
+        return np.maximum(share, 0.0) * light.diffuse + light.ambient
 
-    def colors(self, shown: NDArray[np.int32], points: _Points) -> Floats:
-        """Color of each point by its triangle, shape (n, 3), 0..255, whole numbers."""
-        bright = self._cosine[shown]
-        bent = np.flatnonzero(self._is_bent[shown])
-        which = shown[bent]
-        bright[bent] = points.some(bent).linear(self._start[which], self._slope[:, which])
-        to_light = np.flatnonzero(bright > 0)
-        if self._map is not None:
-            lit = points.some(to_light)
-            places = [lit.linear(start, slope) for start, slope in self._map_places]
-            bright[to_light] *= self._map.lit(*places)
-        np.maximum(bright, 0.0, out=bright)
-        bright *= self._light.diffuse
-        bright += self._light.ambient
-        colors: Floats = self._rgb[shown]
-        colors *= bright[:, None]
-        np.minimum(colors, 255.0, out=colors)
-        return np.rint(colors, out=colors)
+    return bright
 
 
 class _LightMap:

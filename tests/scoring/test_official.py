@@ -34,7 +34,7 @@ def test_known_counts_match_row_for_row(official_dir, official_checkout):
     found = {}
     for (model, scene), text in reply_texts(official_checkout).items():
         plan = parse_plan(text, len(tasks[scene].candidates), "official").plan
-        for score in scorers[scene].score(plan, ["paper"], "membership"):
+        for score in scorers[scene].score(plan, ("paper",), "membership"):
             level = 1 if score.criterion == "membership" else tasks[scene].scene.level
             row = (model, scene, score.setting, score.criterion)
             found[row] = (level, score.tp, score.fp, score.fn)

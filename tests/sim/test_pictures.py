@@ -20,7 +20,6 @@ from phyblock.making.scenes.candidates import make_candidates
 from phyblock.making.scenes.sketch import POSES
 from phyblock.sim import pictures
 from phyblock.sim.backgrounds import GROUNDS
-from phyblock.sim.camera import Window, frame, view_axes
 from phyblock.sim.engine import Pose, quat_xyzw_to_euler_deg
 from phyblock.sim.pictures import assembly_gif, kit_key, ruled_key
 from phyblock.sim.question_pictures import (
@@ -34,6 +33,7 @@ from phyblock.sim.question_pictures import (
     seen_order,
     state_picture,
 )
+from phyblock.sim.raster import Window, frame, view_axes
 from phyblock.types import BACKGROUNDS
 from tests.shipped import TASKS
 from tests.sim.structures import block, clouds, scene_of, tower

@@ -26,7 +26,6 @@ from phyblock.making.questions.base import Draft, Floats, Maker, Slots, UnfairEr
 from phyblock.making.scenes.sketch import lowered
 from phyblock.sim import question_pictures as drawn
 from phyblock.sim.balance import MARGIN_M, is_balanced, surely_falls, surely_stands
-from phyblock.sim.camera import view_axes
 from phyblock.sim.contact import (
     GROUND,
     Turned,
@@ -39,6 +38,7 @@ from phyblock.sim.contact import at as at_place
 from phyblock.sim.dynamics import LEAN_DEG, after_removal, groups, holds
 from phyblock.sim.geometry import corners_m
 from phyblock.sim.question_pictures import is_inside, mark_pixel, seen, shown_pixels
+from phyblock.sim.raster import view_axes
 
 Ints = NDArray[np.int64]
 Lot = frozenset[int]

@@ -20,8 +20,8 @@ from phyblock.domain.scene import Block, Scene, angles_deg
 from phyblock.making.questions import base, sight
 from phyblock.making.questions.base import Draft, Floats, StaticMaker, T, UnfairError, View, pick
 from phyblock.sim.balance import surely_stands
-from phyblock.sim.camera import view_axes
 from phyblock.sim.contact import bounds_m, boxes_near, support_graph, whole_bounds_m
+from phyblock.sim.raster import view_axes
 
 _RECOLORED = 6
 """Number of times that the blocks of a view get other colors, and so other names."""

@@ -27,10 +27,10 @@ from phyblock.making.questions.base import (
     pick,
     shuffled,
 )
-from phyblock.sim.camera import view_axes
 from phyblock.sim.contact import GROUND, bounds_m, support_graph
 from phyblock.sim.pictures import PictureStyle, drawn_m, goal_camera, shoot, visible_shares
 from phyblock.sim.question_pictures import is_inside, least_difference, seen, seen_order
+from phyblock.sim.raster import view_axes
 
 COUNTED = 0.25
 """Minimum visible share of a block that is counted."""
