@@ -81,25 +81,19 @@ class Falls(NamedTuple):
 
 def proves(proof: Stands | Falls, structure: Structure) -> bool:
     """Return True if the proof holds for the structure."""
-    contacts, count = (
-        (*structure.contacts, *structure.narrow, *structure.wide),
-        len(structure.bodies),
-    )
+    contacts = (*structure.contacts, *structure.narrow, *structure.wide)
+    count = len(structure.bodies)
     if not all(GROUND <= one.below < count and 0 <= one.above < count for one in contacts):
         return False
-    if not all(map(_is_square, {(one.normal, *one.sides) for one in contacts})):
-        return False
+    for axes in {(one.normal, *one.sides) for one in contacts}:
+        for (i, a), (j, b) in product(enumerate(axes), repeat=2):
+            # Unit vectors at right angles, but for rounding.
+            if abs(_dot(a, b) - ONE**2 * (i == j)) >= ONE**2 >> 20:
+                return False
     if isinstance(proof, Falls):
         return _releases(structure, proof.motion)
     cases = zip(LOADS, proof.forces, strict=False)
     return len(proof.forces) == len(LOADS) and all(_bears(structure, *case) for case in cases)
-
-
-def _is_square(axes: tuple[Vector, ...]) -> bool:
-    return all(
-        abs(_dot(a, b) - ONE**2 * (i == j)) < ONE**2 >> 20
-        for (i, a), (j, b) in product(enumerate(axes), repeat=2)
-    )
 
 
 def _bears(

@@ -386,8 +386,12 @@ def candidate_camera(block: Block, style: PictureStyle, distance_m: float | None
 def close_camera(block: Block, style: PictureStyle, window: Window) -> Camera:
     """The camera of a single block, which fills about the same share for every type."""
     shape = SHAPES[block.type]
-    share = math.dist(shape.low_m, shape.high_m) / _LARGEST_DIAGONAL_M
-    return frame(drawn_m(block), style.axes, window.scaled(share**_SIZE_CUE))
+    share = (math.dist(shape.low_m, shape.high_m) / _LARGEST_DIAGONAL_M) ** _SIZE_CUE
+    x, y = (window.left + window.right) / 2, (window.bottom + window.top) / 2
+    half_x, half_y = (window.right - window.left) / 2, (window.top - window.bottom) / 2
+    half_x, half_y = half_x * share, half_y * share
+    seen = Window(x - half_x, x + half_x, y - half_y, y + half_y)
+    return frame(drawn_m(block), style.axes, seen)
 
 
 def common_distance_m(blocks: Iterable[Block], style: PictureStyle) -> float:

@@ -52,13 +52,6 @@ class Window(NamedTuple):
     bottom: float
     top: float
 
-    def scaled(self, factor: float) -> Window:
-        """The window shrunk or grown about its center."""
-        x, y = (self.left + self.right) / 2, (self.bottom + self.top) / 2
-        half_x, half_y = (self.right - self.left) / 2, (self.top - self.bottom) / 2
-        half_x, half_y = half_x * factor, half_y * factor
-        return Window(x - half_x, x + half_x, y - half_y, y + half_y)
-
 
 @dataclass(frozen=True, eq=False)
 class Camera:
