@@ -78,7 +78,7 @@ def rows_digests(path: Path) -> dict[str, str]:
 def run_numbers(name: str, root: Path, pictures: Path) -> dict[str, dict[str, str]]:
     """Run a suite of `RUNS` below `root`; digests of its tables by file and model."""
     arguments = [text.format(official=f"{official_root()}/PhyBlock") for text in RUNS[name]]
-    made = _workspace(root / name, pictures)
+    made = Workspace(root / name, pictures)
     made.does("run", *arguments, "--out", made.out, "--yes", "--no-report", fresh=True)
     tables = [made.out / "tables" / file for file in ("estimates.csv", *HEADLINES)]
     return {path.name: rows_digests(path) for path in tables if path.is_file()}
@@ -86,18 +86,13 @@ def run_numbers(name: str, root: Path, pictures: Path) -> dict[str, dict[str, st
 
 def request_digests(name: str, root: Path, pictures: Path) -> dict[str, Any]:
     """Run a suite of `SUITES` against a local server; number and digest of all bodies sent."""
-    made = _workspace(root / f"requests-{name}", pictures)
+    made = Workspace(root / f"requests-{name}", pictures)
     fields = {"dataset": {"format": "builtin", "path": "phyblock-400"}, "images": _SHOWN}
     suite = {**fields, "limit": _LIMITS.get(name, 4), **SUITES[name]}
     with made.served(OpenAIChat(), "probe", **suite) as server:
         made.completed("--yes")
     bodies = sorted(json.dumps(seen.raw, sort_keys=True) for seen in server.seen)
     return {"requests": len(bodies), "digest": _digest(bodies)}
-
-
-def _workspace(root: Path, pictures: Path) -> Workspace:
-    root.mkdir(parents=True)
-    return Workspace(root, pictures)
 
 
 def _digest(lines: list[str]) -> str:

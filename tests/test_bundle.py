@@ -84,7 +84,6 @@ def test_a_bundle_verifies_elsewhere_and_holds_nothing_of_this_machine(made, tmp
     held = contents(made, tmp_path / "held")
     assert not any(str(made.root).encode() in data for data in held.values())
     assert b"messages" not in held[MANIFEST]
-    (tmp_path / "elsewhere").mkdir()
     elsewhere = Workspace(tmp_path / "elsewhere", tmp_path / "pictures")
     for folder in folders(made):
         shutil.copytree(folder, elsewhere.root / folder.name)

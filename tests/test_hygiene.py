@@ -12,7 +12,6 @@ import pytest
 from phyblock.sim.engine import ENGINES
 
 ROOT = Path(__file__).parents[1]
-PACKAGES = ("phyblock",)
 LOCKS = ("requirements.lock", "requirements-dev.lock")
 MODULES = {
     "PIL": "pillow",
@@ -70,13 +69,13 @@ def test_lock_files_agree_and_are_installed_with_their_hashes():
 
 def test_every_package_that_is_imported_is_declared():
     imported = set()
-    for path in (path for package in PACKAGES for path in (ROOT / package).rglob("*.py")):
+    for path in (ROOT / "phyblock").rglob("*.py"):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, ast.Import):
                 imported |= {name.name.partition(".")[0] for name in node.names}
             elif isinstance(node, ast.ImportFrom) and not node.level:
                 imported.add(str(node.module).partition(".")[0])
-    outside = imported - sys.stdlib_module_names - set(PACKAGES)
+    outside = imported - sys.stdlib_module_names - {"phyblock"}
     missing = {name for name in outside if MODULES.get(name, name).lower() not in declared()}
     assert not missing
 
@@ -97,7 +96,7 @@ def test_nothing_that_is_built_is_tracked():
         pytest.skip("not a git checkout")
     files = [Path(name) for name in listed.stdout.split("\0") if name]
     folders = {file.parts[0] for file in files if len(file.parts) > 1}
-    known = {".ci", "benchmarks", "docs", "prompts", "results", "tests", *PACKAGES}
+    known = {".ci", "benchmarks", "docs", "prompts", "results", "tests", "phyblock"}
     assert folders <= known
     # three.js is shipped as it is published, with its license.
     ours = [file for file in files if file.parent.name != "three"]

@@ -12,6 +12,7 @@ import os
 import shutil
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Coroutine, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -78,6 +79,14 @@ def problem_of(error: type[PhyblockError], work: Callable[..., object], *args: o
         work(*args)
     (problem,) = caught.value.problems
     return problem
+
+
+def until(is_so: Callable[[], bool]) -> None:
+    """Wait for what a process or a thread of its own is about to do."""
+    end = time.monotonic() + 20
+    while not is_so():
+        assert time.monotonic() < end
+        time.sleep(0.005)
 
 
 def plan_text(*numbers: int) -> str:
@@ -166,6 +175,7 @@ class Workspace:
     def __init__(self, root: Path, pictures: Path) -> None:
         self.root = root
         self.cache = root / "cache"
+        root.mkdir(parents=True, exist_ok=True)
         for folder in shared_folders(pictures):
             folder.mkdir(parents=True, exist_ok=True)
         if not self.cache.exists():

@@ -33,8 +33,8 @@ scenes = st.sampled_from(SCENES[::9])
 seeds = st.integers(0, 2**32 - 1)
 
 
-def block(order, place, depend=(), kind="cube", color="red", euler=(0.0, 0.0, 0.0), layer=0):
-    return Block(order, kind, color, place, euler, depend, layer or 1 + bool(depend))
+def block(order, place, depend=(), kind="cube", color="red", euler=(0.0, 0.0, 0.0)):
+    return Block(order, kind, color, place, euler, depend, 1 + bool(depend))
 
 
 def shown(*blocks, azimuth=45.0):

@@ -6,7 +6,6 @@ import json
 import socket
 import struct
 import threading
-import time
 
 import pytest
 from hypothesis import given
@@ -18,7 +17,7 @@ from phyblock.models.request import HaltedError, Image, Message, Request
 from phyblock.tracks.picking import Choice, Pick, Picking
 from phyblock.web.server import LARGEST_BODY_BYTES, Server
 from phyblock.web.session import NotNowError, Person, PlaySession, plan_session
-from tests.workspace import SCENES, in_a_loop
+from tests.workspace import SCENES, in_a_loop, until
 
 PICTURE = Image(b"pixels", "candidates", 64, 64)
 PICKING = Picking(
@@ -278,17 +277,9 @@ def test_others_and_what_is_no_answer_are_refused_and_change_nothing(
     assert session.state(-1) == before
 
 
-def is_busy():
-    """True if a server's thread answers a request."""
-    return any("process_request_thread" in thread.name for thread in threading.enumerate())
-
-
-def until_idle():
-    """Wait until every request is through."""
-    end = time.monotonic() + 10
-    while is_busy():
-        assert time.monotonic() < end
-        time.sleep(0.005)
+def is_idle():
+    """True if no thread of a server answers a request."""
+    return not any("process_request_thread" in one.name for one in threading.enumerate())
 
 
 def test_only_files_that_were_named_are_served_and_a_fault_of_ours_is_seen(server, tmp_path, capfd):
@@ -300,7 +291,7 @@ def test_only_files_that_were_named_are_served_and_a_fault_of_ours_is_seen(serve
     assert ask(server, path="/{token}/run.yaml").status == 404
     with pytest.raises(http.client.RemoteDisconnected):
         ask(server, path="/{token}/gone.html")
-    until_idle()
+    until(is_idle)
     server.files = {}
     assert "FileNotFoundError" in capfd.readouterr().err
 
@@ -332,18 +323,17 @@ def test_whatever_is_asked_for_is_answered_with_a_refusal(server, target, method
 @pytest.mark.parametrize("resets", [True, False])
 def test_who_leaves_while_waiting_leaves_no_word_on_the_terminal(server, session, resets, capfd):
     # Threads of earlier requests may still be about to end, and would be taken for this one's.
-    until_idle()
+    until(is_idle)
     path = f"/{token(server)}/state?after={session.state(-1)['change']}"
     lines = f"GET {path} HTTP/1.1\r\nHost: {server.hosts[0]}\r\n\r\n"
     # The second is asked for on the same connection, which is gone when it is read.
     connection = send(server, 2 * lines.encode())
-    while not is_busy():
-        time.sleep(0.005)
+    until(lambda: not is_idle())
     if resets:
         connection.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
     connection.close()
     session.welcome("ada")
-    until_idle()
+    until(is_idle)
     assert capfd.readouterr() == ("", "")
 
 

@@ -4,7 +4,6 @@ What is answered here is a script's, to test the page: it says nothing of what p
 """
 
 import re
-import time
 from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,7 +12,7 @@ import pytest
 
 from tests.fork_server import Forked
 from tests.web.conftest import LOOK, Visit
-from tests.workspace import SCENES, plan_text, questions, read_lines, write_questions
+from tests.workspace import SCENES, plan_text, questions, read_lines, until, write_questions
 
 SUBTASKS = ("SH", "OR", "AD", "VP")
 PHONE = {"width": 390, "height": 780}
@@ -54,7 +53,10 @@ def sitting(browser, workspace, **options):
             line = process.stdout.readline()
             printed = re.search(r"(http://127\.0\.0\.1:\d+/)(\S+)/", line)
             assert printed, line
-            address = given_to_a_browser(workspace.root / "opened")
+            note = workspace.root / "opened"
+            until(note.exists)
+            address = note.read_text().strip()
+            note.unlink()
             # Others on the machine can read what a browser is started with.
             assert printed[2] not in address
             visit = opened(browser, address, **options)
@@ -64,16 +66,6 @@ def sitting(browser, workspace, **options):
             visit.page.close()
         finally:
             process.kill()
-
-
-def given_to_a_browser(note):
-    end = time.monotonic() + 20
-    while not note.exists():
-        assert time.monotonic() < end
-        time.sleep(0.01)
-    address = note.read_text().strip()
-    note.unlink()
-    return address
 
 
 def opened(browser, address, **options):
