@@ -41,11 +41,11 @@ from phyblock.domain.question import LETTERS, SUBTASK_NAMES, SUBTASKS, Subtask
 from phyblock.domain.scene import AssemblyTask, fingerprint
 from phyblock.errors import DataError, Problem
 from phyblock.files import OutFolder, bundled_sets, write_named
-from phyblock.making import checks, files, season
-from phyblock.making.questions.audit import Probe, audit_questions
+from phyblock.making import checks, files
+from phyblock.making.questions.guesses import Probe, audit_questions
 from phyblock.making.questions.production import MAKERS, make_questions, problem_of
 from phyblock.making.scenes.candidates import make_candidates
-from phyblock.making.scenes.completing import complete, palette_of, read_given
+from phyblock.making.scenes.completing import complete, read_given
 from phyblock.making.scenes.production import Production, builtin_forms, shares
 from phyblock.making.scenes.sketch import PALETTES, Palette, colorless
 from phyblock.sim.engine import described_engine, other_engine
@@ -116,7 +116,7 @@ def _making(
     """
     if shard is None or not shards_folder(out).exists():
         files.check_out(out, names)
-    shards = open_shards(shard, out, f"{work}\n{described_engine()}\n{season.code_digest()}\n")
+    shards = open_shards(shard, out, f"{work}\n{described_engine()}\n{files.code_digest()}\n")
     if other := other_engine():
         message = f"made with {other}: the default one may make another set of the same seed"
         click.echo(message, err=True)
@@ -136,8 +136,9 @@ def _conclude(
     rows: Iterable[tuple[tuple[str, ...], int, int]],
     problems: Iterable[Problem | str],
 ) -> None:
-    """Print rows of words with the numbers that failed, of all, then the problems and the verdict
-    on a set; exit with 1 if there are problems.
+    """Print the table of checks, the problems and the verdict; exit with 1 if there are problems.
+
+    Each row has words, the number of things that failed, and the number of all.
     """
     shown = [(*words, str(of - failed), str(of)) for words, failed, of in rows]
     print_rows(make_console(), (*headings, "of"), shown, numbers=2)
@@ -233,7 +234,7 @@ def commit(arguments: tuple[str, ...], public: str, out: Path) -> None:
     Writes DIR/secret.txt, to be kept, and DIR/commitment.json, to be published: digests of the
     secret, of phyblock's code and of the built-in scenes, and the later public value to use.
     """
-    secret, commitment = season.commit(out, _season_arguments(arguments), public)
+    secret, commitment = files.commit_season(out, _season_arguments(arguments), public)
     click.echo(f"publish {shown_path(commitment)}; keep {shown_path(secret)}")
 
 
@@ -246,7 +247,7 @@ def reveal(commitment: Path, secret: Path, public: str) -> None:
 
     Refuses a secret, code or physics engine other than the one committed to.
     """
-    arguments, seed = season.reveal(commitment, secret, public)
+    arguments, seed = files.reveal_season(commitment, secret, public)
     settled = _season_arguments(shlex.split(arguments))
     click.echo(f"phyblock scenes generate {settled} --seed {seed} --out DIR")
 
@@ -314,7 +315,9 @@ def complete_set(data: Path, jobs: int, out: Path | None) -> None:
         raise DataError(problems)
     whole = [(one.scene, one.offered) for one in done if one.scene]
     made = [scene for scene, _ in whole]
-    palette = PALETTES[palette_of(made)]
+    # Distractors are of the kit if it has all blocks of the scenes.
+    kinds = {block.kind for scene in made for block in scene.blocks}
+    palette = PALETTES["kit" if kinds <= set(PALETTES["kit"]) else "full"]
     tasks = [
         (scene, offered or make_candidates(scene, palette=palette)) for scene, offered in whole
     ]

@@ -1,23 +1,38 @@
-"""Sets as folders: lines, a card, the version, checksums."""
+"""Sets as folders: lines, a card, the version, checksums, and commitments to later sets."""
 
 from __future__ import annotations
 
+import secrets
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Annotated
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from pydantic import Field, TypeAdapter
 
-from phyblock.data.base import VERSION_FILE
+import phyblock
+from phyblock.data.base import VERSION_FILE, read_data
+from phyblock.data.lookup import find_data_set
 from phyblock.data.questions import StoredQuestion
-from phyblock.data.scenes import StoredScene
+from phyblock.data.scenes import SCENES_FILE, StoredScene
 from phyblock.domain.question import LETTERS, SUBTASK_NAMES, SUBTASKS, Question
 from phyblock.domain.scene import CandidateSet, Scene
-from phyblock.errors import Problem
-from phyblock.files import atomic_write, check_free, digest_of_file, make_folder, read_text, writing
+from phyblock.errors import DataError, Problem
+from phyblock.files import (
+    atomic_write,
+    bundled_sets,
+    check_free,
+    digest_of_file,
+    make_folder,
+    read_text,
+    writing,
+)
 from phyblock.making.checks import LEVEL_LIMITS
 from phyblock.making.scenes.sketch import PALETTES, Palette
-from phyblock.sim.engine import other_engine
+from phyblock.records.record import Line, decode
+from phyblock.sim.engine import described_engine, other_engine
+from phyblock.text import hex_digest
 
 SUMS_FILE = "SHA256SUMS"
 SCENE_FILES = ("README.md", "scenes.jsonl", VERSION_FILE)
@@ -181,3 +196,76 @@ def question_card(
         rows=rows,
         pictures=PICTURES if has_pictures else "",
     )
+
+
+# Seasons: sets that nobody can choose or know in advance, and that anyone can make again. A maker
+# publishes the digests of a secret and of the code, then waits for a value that nobody controls,
+# such as that of a beacon. The seed of the set is a digest of the secret and the value.
+
+_Digest = Annotated[str, Field(pattern="^[0-9a-f]{64}$")]
+
+
+class Commitment(Line, extra="forbid"):
+    """Everything that is fixed before a season; to be published."""
+
+    secret_sha256: _Digest
+    code_sha256: _Digest
+    engine: str
+    arguments: str
+    """Arguments of `phyblock scenes generate`, except seed and folder."""
+    public: str
+    """The later public value to use, in words."""
+
+    @classmethod
+    def now(cls, secret: str, arguments: str, public: str) -> Commitment:
+        """Return the commitment to a secret with today's code and engine."""
+        return cls(
+            secret_sha256=hex_digest(secret),
+            code_sha256=code_digest(),
+            engine=described_engine(),
+            arguments=arguments,
+            public=public,
+        )
+
+
+def commit_season(folder: Path, arguments: str, public: str) -> tuple[Path, Path]:
+    """Write a new secret and the commitment to it, and return the two files."""
+    paths = (folder / "secret.txt", folder / "commitment.json")
+    check_free(paths, "give another --out")
+    secret = secrets.token_hex(32)
+    commitment = Commitment.now(secret, arguments, public)
+    make_folder(folder)
+    with writing(folder):
+        atomic_write(paths[0], f"{secret}\n")
+        paths[0].chmod(0o600)
+        atomic_write(paths[1], f"{commitment.as_json()}\n")
+    return paths
+
+
+def reveal_season(commitment: Path, secret: Path, public: str) -> tuple[str, int]:
+    """Return the arguments and the seed of a season whose public value is known.
+
+    Raises DataError for a secret, code or engine other than the one committed to.
+    """
+    where = str(commitment)
+    committed = decode(TypeAdapter(Commitment), read_data(commitment), where, Commitment)
+    revealed = read_data(secret).decode("ascii", "replace").strip()
+    found = Commitment.now(revealed, committed.arguments, committed.public)
+    problems = [
+        Problem(where, "is not what was committed to", field, getattr(found, field), meant)
+        for field, meant in committed
+        if getattr(found, field) != meant
+    ]
+    if problems:
+        raise DataError(problems)
+    return committed.arguments, int(hex_digest(f"{revealed}\n{public}")[:16], 16)
+
+
+def code_digest() -> str:
+    """Return the digest of the package's own files and the built-in scenes, with their names."""
+    root = Path(phyblock.__file__).parent
+    files = (path for path in root.rglob("*") if path.suffix in (".py", ".md", ".yaml"))
+    named = sorted((path.relative_to(root).as_posix(), path) for path in files)
+    named = [(name, path) for name, path in named if not name.startswith("bundled/")]
+    named += [(name, find_data_set(name) / SCENES_FILE) for name in bundled_sets(SCENES_FILE)]
+    return hex_digest("".join(f"{hex_digest(path.read_bytes())} {name}\n" for name, path in named))

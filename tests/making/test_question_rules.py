@@ -13,12 +13,19 @@ from phyblock.domain.blocks import COLORS, SHAPES
 from phyblock.domain.question import LETTERS, Mark, QuestionPicture
 from phyblock.domain.scene import SYMMETRIES, Block, Scene
 from phyblock.making.questions import dynamics
-from phyblock.making.questions.base import WORDINGS, Draft, UnfairError, four_alike, ranks_among
+from phyblock.making.questions.base import (
+    BALANCE,
+    WORDINGS,
+    Draft,
+    UnfairError,
+    four_alike,
+    ranks_among,
+)
 from phyblock.making.questions.guesses import keeping_odds
-from phyblock.making.questions.production import BALANCE, even_letters
+from phyblock.making.questions.production import even_letters
 from phyblock.making.questions.properties import layers_of, sure_blocks
 from phyblock.making.questions.relations import AXIS_TURNS, LENGTHS, images, phrases, put_beside
-from phyblock.making.questions.sight import SHAPE_WORDS, names, resolve, resolve_one
+from phyblock.making.questions.sight import SHAPE_WORDS, names, resolve, resolve_seen
 from phyblock.making.scenes.sketch import POSES, lowered, transformed
 from phyblock.sim.balance import is_balanced
 from phyblock.sim.contact import find_gaps, find_overlaps, support_graph
@@ -52,7 +59,7 @@ def test_a_name_fits_its_block_alone_and_speaks_of_what_it_may(scene, features, 
     for one in scene.blocks:
         for name in names(one, picture, sorted(features)):
             assert resolve(name, picture) == resolve(name, picture, loosely=True) == (one.order,)
-            assert resolve_one(f"the {name}", picture) == one
+            assert resolve_seen([f"the {name}"], picture, 0.0) == [one]
             if "color" not in features:
                 assert not {*COLORS} & set(name.split())
             if "type" not in features:

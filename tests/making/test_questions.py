@@ -13,8 +13,8 @@ from phyblock.domain.blocks import COLORS
 from phyblock.domain.question import LETTERS, SUBTASKS, rotated
 from phyblock.errors import DataError
 from phyblock.making.files import question_card
-from phyblock.making.questions.audit import audit_questions, duplicates_of
 from phyblock.making.questions.dynamics import OUTCOME_TEXTS
+from phyblock.making.questions.guesses import audit_questions, duplicates_of
 from phyblock.making.questions.production import MAKERS, make_questions, problem_of
 from phyblock.making.questions.sight import LEAST_PIXELS, palette
 from phyblock.sim.contact import find_gaps
@@ -250,11 +250,14 @@ def test_letters_are_counted_and_balance_is_judged(asked):
     assert any("a letter is right" in finding for finding in skewed.findings())
 
 
-def test_a_repeat_is_found_in_any_order_of_its_options(asked):
+def test_a_repeat_is_found_in_any_order_of_its_options_and_blocks(asked):
     for subtask in ("SH", "VP", "AD"):
         first = of(asked, subtask)[0]
         found = duplicates_of([first, replace(rotated(first, 1), id="again")])
         assert found == ({} if subtask == "AD" else {"again": first.id})
+        pictures = tuple(replace(one, blocks=one.blocks[::-1]) for one in first.pictures)
+        listed = replace(first, id="again", pictures=pictures)
+        assert duplicates_of([first, listed]) == {"again": first.id}
     assert duplicates_of(asked) == {}
 
 

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from phyblock.domain.blocks import COLORS, KIT_PALETTE
 from phyblock.domain.question import LETTERS, Question
 from phyblock.domain.scene import Block, Candidate, CandidateSet, Plan, Scene
-from phyblock.making.questions.audit import text_rule
+from phyblock.making.questions.guesses import text_rule
 from phyblock.parsing.answer import parse_answer
 from phyblock.parsing.move import parse_move
 from phyblock.parsing.plan import parse_plan, parse_poses

@@ -37,6 +37,8 @@ WORDINGS: dict[str, str] = yaml.safe_load(
 """The text of each kind of question; words in braces are slots."""
 WORDS: Mapping[str, Any] = WORDINGS.pop("words")  # type: ignore[assignment]
 """Words that options and slots are made of."""
+BALANCE = (0.22, 0.28)
+"""Limits of the share of right answers for each letter."""
 
 
 class UnfairError(PhyblockError):
@@ -148,18 +150,20 @@ class StaticMaker(Maker):
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """Yield fair questions about a scene, view by view."""
         for _ in range(_VIEWS_A_SCENE):
-            yield from itertools.islice(self._fair(scene, drawn_view(rng), rng), _DRAFTS_A_VIEW)
-
-    def _fair(self, scene: Scene, view: View, rng: np.random.Generator) -> Iterator[Draft]:
-        for asked in self.ask(scene, view, rng):
-            try:
-                right = self.right(asked)
-            except UnfairError:
-                continue
-            options = asked.texts or self.offer(asked, right, rng)
-            if right in options:
+            found = 0
+            for asked in self.ask(scene, drawn_view(rng), rng):
+                try:
+                    right = self.right(asked)
+                except UnfairError:
+                    continue
+                options = asked.texts or self.offer(asked, right, rng)
+                if right not in options:
+                    continue
                 shown = replace(scene, blocks=asked.picture.blocks[: len(scene)])
                 yield replace(asked, scene=shown, options=tuple(right_first(right, options)))
+                found += 1
+                if found == _DRAFTS_A_VIEW:
+                    break
 
     def answer(self, asked: Draft) -> tuple[int, ...]:
         """Return the answer, derived only from the one picture and the slots of the text."""

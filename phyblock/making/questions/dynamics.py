@@ -239,27 +239,22 @@ def _by_colors(
     lots = [moved, *shuffled(rng, sorted(fair, key=sorted))[:_MOST_LOTS]]
     pixels = shown_pixels(plain, seen(plain))
     unlike = np.array([[sum(pixels[o] for o in a ^ b) for b in lots] for a in lots], dtype=float)
-    measures = np.array([_looks_of_lot(plain, order, lot) for lot in lots])
-    four = base.four_alike(measures, unlike, sight.LEAST_PIXELS, rng)
+    # Area, number and place of highlighted blocks, and differences from naive rules.
+    block_at, looks = seen(plain).block, list[tuple[float, ...]]()
+    side, area = len(block_at) / 20, max(int((block_at >= 0).sum()), 1) / 20
+    fall_by_rule = [resting_on(plain.blocks, order, only=only) for only in (False, True)]
+    for lot in lots:
+        vertices = [i for i, block in enumerate(plain.blocks) if block.order in (lot or {order})]
+        rows, columns = np.nonzero(np.isin(block_at, vertices))
+        places = (rows.mean(), columns.mean(), rows.min(), rows.max())
+        size = (len(rows) / area if lot else 0.0, float(len(lot)))
+        unlike_rules = (float(len(lot ^ one)) for one in fall_by_rule)
+        looks.append((*size, *(float(x) / side for x in places), *unlike_rules))
+    four = base.four_alike(np.array(looks), unlike, sight.LEAST_PIXELS, rng)
     slots = dict(zip(("color", "other", "taken"), pick(rng, _COLORS), strict=True))
     shades = [sight.highlighted(plain.blocks, lots[place], slots, order) for place in four]
     options = [replace(plain, blocks=blocks) for blocks in shades]
     return slots, options if options and sight.are_told_apart(options) else ()
-
-
-def _looks_of_lot(plain: QuestionPicture, taken: int, lot: Lot) -> tuple[float, ...]:
-    """Return area, number and place of highlighted blocks, and differences from naive rules."""
-    shot = seen(plain)
-    vertices = [i for i, block in enumerate(plain.blocks) if block.order in (lot or {taken})]
-    rows, columns = np.nonzero(np.isin(shot.block, vertices))
-    side, area = len(shot.block) / 20, max(int((shot.block >= 0).sum()), 1) / 20
-    return (
-        len(rows) / area if lot else 0.0,
-        float(len(lot)),
-        *(float(x) / side for x in (rows.mean(), columns.mean(), rows.min(), rows.max())),
-        float(len(lot ^ resting_on(plain.blocks, taken))),
-        float(len(lot ^ resting_on(plain.blocks, taken, only=True))),
-    )
 
 
 # PD: structures of the data set stand at every step, few of their blocks have more supports than

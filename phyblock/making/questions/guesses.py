@@ -1,24 +1,34 @@
-"""Features by which someone might guess an answer without understanding the question.
+"""Guessing an answer without understanding the question: features, and what they reveal of a set.
 
 Texts have words and numbers, pictures have simple measures. Drafts are dropped until these reveal
-nothing (`keeping_odds`), and the probes of the audit learn from them.
+nothing (`keeping_odds`). The audit of a set looks at the balance of answers and at repeated
+questions, and has two probes that learn from questions about other base scenes and answer the rest:
+one reads only the texts (logistic regression over words, numbers and likeness), one measures the
+pictures without knowing what is in them (ridge regression): outlines, colors by height, what an
+option changes and whether something is below that, where marks are. If either is right much more
+often than chance, the set gives its answers away.
 """
 
 from __future__ import annotations
 
 import itertools
+import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections import Counter
+from collections.abc import Hashable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from phyblock.domain.question import LETTERS, Question
-from phyblock.making.questions.base import Draft, Floats
-from phyblock.sim.pictures import Shot
-from phyblock.sim.question_pictures import SEEN_PX, changed_pixels, mark_pixel, seen
+from phyblock.domain.question import LETTERS, SUBTASKS, Question, Subtask
+from phyblock.errors import Problem, SpecError
+from phyblock.making.questions.base import BALANCE, Draft, Floats
+from phyblock.sim.pictures import PictureStyle, Shot
+from phyblock.sim.question_pictures import SEEN_PX, changed_pixels, mark_pixel, question_key, seen
 from phyblock.text import plain_sum
+from phyblock.tracks.questions import FOLDS, Folds, Rule, guesses_of, majority_rule
 
 Mask = NDArray[np.bool_]
 _BELOW_PX, _BANDS, _CROSSED = 3, 6, 0.25
@@ -191,10 +201,20 @@ def keeping_odds(drafts: Sequence[Draft]) -> Floats:
     half_of = {base: n % 2 for n, base in enumerate(sorted(set(base_of.values())))}
     halves = [[i for i in telling if half_of[base_of[i]] == half] for half in (0, 1)]
 
+    def rows_of(one: Draft) -> Iterator[Mapping[str, float]]:
+        """Yield the features of each option; those of texts are also given for its kind alone."""
+        if one.looks:
+            yield from ({f"{one.wording}: {i}": x for i, x in enumerate(row)} for row in one.looks)
+            return
+        together = " / ".join(sorted(one.texts))
+        for option, features in zip(one.texts, text_features(one.text, one.texts), strict=True):
+            own = {f"{one.group}: {name}": value for name, value in features.items()}
+            yield {"": 1.0, **features, **own, f"{one.group}: {option} of {together}": 1.0}
+
     def table(chosen: Sequence[int], names: dict[str, int], grows: bool) -> sparse.csr_matrix:
         """Return the features of options, four rows per draft; new names are added or dropped."""
         values, columns, starts = list[float](), list[int](), [0]
-        for features in (row for i in chosen for row in _features(drafts[i])):
+        for features in itertools.chain.from_iterable(rows_of(drafts[i]) for i in chosen):
             known = {name: x for name, x in features.items() if grows or name in names}
             values += known.values()
             columns += (names.setdefault(name, len(names)) for name in known)
@@ -225,14 +245,186 @@ def _chances(scores: Floats) -> Floats:
     return chances
 
 
-def _features(one: Draft) -> Iterator[Mapping[str, float]]:
-    """Yield the features of each option; those of texts are also given for its kind alone."""
-    if one.looks:
-        for row in one.looks:
-            yield {f"{one.wording}: {i}": x for i, x in enumerate(row)}
-        return
-    options = one.texts
-    together = " / ".join(sorted(options))
-    for option, features in zip(options, text_features(one.text, options), strict=True):
-        own = {f"{one.group}: {name}": value for name, value in features.items()}
-        yield {"": 1.0, **features, **own, f"{one.group}: {option} of {together}": 1.0}
+# Audit
+
+GUESSABLE = 0.35
+"""Accuracy that no probe of a sound set exceeds, unless chance is within its interval."""
+_FEWEST, _RIDGE = 12, 4.0
+_SEED, _STRENGTH = 0, 0.05
+
+
+class Probe(NamedTuple):
+    """The number of questions that a probe answered correctly, of `n`."""
+
+    right: int
+    n: int
+
+    @property
+    def accuracy(self) -> float:
+        """Share of questions answered correctly."""
+        return self.right / self.n
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Wilson score interval of 95 %."""
+        z, n, p = 1.96, self.n, self.accuracy
+        middle = (p + z * z / (2 * n)) / (1 + z * z / n)
+        half = z / (1 + z * z / n) * math.sqrt(p * (1 - p) / n + z * z / (4 * n * n))
+        return middle - half, middle + half
+
+
+@dataclass(frozen=True)
+class SubtaskAudit:
+    """Facts about the questions of one subtask.
+
+    `letters` are shares of right answers by letter (ordering: by the letter that comes first),
+    `repeats` the questions that ask the same as an earlier one. `probes` are `majority`, `text`
+    and, if options are pictures, places or effects of removing a marked block, `pictures`, which is
+    also reported by kind of question.
+    """
+
+    subtask: Subtask
+    n: int
+    letters: tuple[float, ...]
+    chance: float
+    probes: Mapping[str, Probe]
+    repeats: tuple[str, ...]
+
+    def findings(self) -> Iterator[str]:
+        """Yield a sentence on each problem."""
+        low, high = BALANCE
+        if self.subtask != "OR" and not low <= min(self.letters) <= max(self.letters) <= high:
+            yield f"{self.subtask}: a letter is right outside {low:.0%} to {high:.0%}"
+        for name, probe in self.probes.items():
+            if probe.accuracy > GUESSABLE and probe.interval[0] > self.chance:
+                yield f"{self.subtask}: the {name} probe reaches {100 * probe.accuracy:.0f} %"
+        yield from (f"{name}: asks what an earlier question asks" for name in self.repeats)
+
+
+def audit_questions(questions: Sequence[Question]) -> Iterator[SubtaskAudit]:
+    """Yield an audit of each subtask that has questions, in the paper's order.
+
+    Raises SpecError if scikit-learn, which the text probe uses, is not installed.
+    """
+    folds = Folds(questions)
+    rules = {"majority": majority_rule, "text": text_rule}
+    readers = {name: guesses_of(questions, rule) for name, rule in rules.items()}
+    repeated = duplicates_of(questions)
+    for subtask in SUBTASKS:
+        mine = [question for question in questions if question.subtask == subtask]
+        if not mine:
+            continue
+        n, first = len(mine), Counter(question.answer[0] for question in mine)
+        probes = {
+            name: Probe(sum(guesses(q) == q.answer for q in mine), n)
+            for name, guesses in readers.items()
+        }
+        by_kind = picture_probe(mine, folds)
+        if by_kind:
+            right, shown = (sum(counts) for counts in zip(*by_kind.values(), strict=True))
+            probes["pictures"] = Probe(right, shown)
+        if len(by_kind) > 1:
+            probes |= {f"pictures, {kind}": probe for kind, probe in by_kind.items()}
+        chances = [1 / math.factorial(4) if subtask == "OR" else 1 / len(q.options) for q in mine]
+        yield SubtaskAudit(
+            subtask=subtask,
+            n=n,
+            letters=tuple(first[i] / n for i in range(len(LETTERS))),
+            chance=math.fsum(chances) / n,
+            probes=probes,
+            repeats=tuple(q.id for q in mine if q.id in repeated),
+        )
+
+
+def text_rule(known: Sequence[Question]) -> Rule:
+    """Return the rule that picks the option with the highest odds of a logistic regression over
+    words, numbers and likeness of texts; for an order, the most frequent one.
+
+    Raises SpecError if scikit-learn is not installed.
+    """
+    majority = majority_rule(known)
+    single = [question for question in known if len(question.answer) == 1]
+    if not single:
+        return majority
+    try:
+        from sklearn.feature_extraction import DictVectorizer  # type: ignore[import-untyped]
+        from sklearn.linear_model import LogisticRegression  # type: ignore[import-untyped]
+    except ImportError as error:
+        message = "the text probe needs scikit-learn, which is not installed"
+        problem = Problem("text", message, hint="pip install 'phyblock[audit]'")
+        raise SpecError(problem) from error
+    vectorizer = DictVectorizer()
+    regression = LogisticRegression(C=_STRENGTH, max_iter=1000, random_state=_SEED)
+    rows = [features for q in single for features in text_features(q.text, q.options)]
+    is_right = [index in q.answer for q in single for index in range(len(q.options))]
+    regression.fit(vectorizer.fit_transform(rows), is_right)
+
+    def guess(question: Question) -> tuple[int, ...]:
+        if question.subtask == "OR":
+            return majority(question)
+        rows = vectorizer.transform(text_features(question.text, question.options))
+        odds: Any = regression.decision_function(rows).tolist()
+        return (max(range(len(odds)), key=odds.__getitem__),)
+
+    return guess
+
+
+def duplicates_of(questions: Sequence[Question]) -> dict[str, str]:
+    """Return the ids of questions that repeat an earlier one, each with the id of that one.
+
+    Questions are equal if a reader sees the same, on any background, with blocks and options
+    listed in any order.
+    """
+    first: dict[Hashable, str] = {}
+    found: dict[str, str] = {}
+    for question in questions:
+        shown: dict[str, str] = {}
+        for one in question.pictures:
+            blocks, framed = (
+                tuple(sorted(some, key=lambda b: (*b.kind, b.position_m, b.euler_deg)))
+                for some in (one.blocks, one.framed)
+            )
+            plain = replace(one, background=None, blocks=blocks, framed=framed)
+            shown[one.label] = question_key(plain, PictureStyle())
+        options = [shown.pop(a, b) for a, b in zip(LETTERS, question.options, strict=False)]
+        seen = (question.subtask, question.text, tuple(sorted(options)), tuple(shown.values()))
+        if (twin := first.setdefault(seen, question.id)) != question.id:
+            found[question.id] = twin
+    return found
+
+
+def picture_probe(questions: Sequence[Question], folds: Folds) -> dict[str, Probe]:
+    """Answer questions by measures of their pictures alone, and return a probe for each kind.
+
+    Ridge regression of being right (ordering: of the place in the order), learned from questions
+    of the same kind that share no base scene. Kinds without measures are omitted.
+    """
+    rows_of = {q.id: measures_of(q) for q in questions}
+    kinds: dict[str, list[Question]] = {}
+    for question in questions:
+        if len(rows_of[question.id]):
+            kinds.setdefault(question.wording.rstrip("-0123456789"), []).append(question)
+    found: dict[str, Probe] = {}
+    for kind, members in kinds.items():
+        right = n = 0
+        for fold in range(FOLDS):
+            held_out = [q for q in members if folds.of(q) == fold]
+            known = [q for q in members if folds.is_known(fold, q)]
+            if not held_out or len(known) < _FEWEST:
+                continue
+            # Measures and values have a mean of zero over the four options. The right one has the
+            # highest value, or in an order the first one.
+            rows = np.vstack([rows_of[q.id] for q in known])
+            values = np.zeros((len(known), len(LETTERS)))
+            for value, q in zip(values, known, strict=True):
+                value[list(q.answer)] = np.arange(len(q.answer), 0, -1)
+            worth = (values - values.mean(axis=1, keepdims=True)).ravel()
+            gram = rows.T @ rows + _RIDGE * np.eye(rows.shape[1])
+            weights = np.linalg.solve(gram, rows.T @ worth)
+            for question in held_out:
+                order = np.argsort(-(rows_of[question.id] @ weights), kind="stable")
+                right += tuple(order[: len(question.answer)]) == question.answer
+                n += 1
+        if n:
+            found[kind] = Probe(right, n)
+    return found

@@ -25,7 +25,7 @@ from phyblock.domain.question import LETTERS, Mark, Question, QuestionPicture, S
 from phyblock.domain.scene import Scene
 from phyblock.errors import DataError, PhyblockError, Problem
 from phyblock.making.questions import dynamics, properties, relations, views
-from phyblock.making.questions.base import Draft, Maker, pick, read_again, shuffled
+from phyblock.making.questions.base import BALANCE, Draft, Maker, pick, read_again, shuffled
 from phyblock.making.questions.guesses import keeping_odds, measures_of
 from phyblock.sim.question_pictures import filled
 from phyblock.types import BACKGROUNDS, Background
@@ -178,8 +178,6 @@ _SPREAD = 20
 """Number of drafts considered per wanted one of a kind, if the pool has as many."""
 _SPARE = 1.2
 """Minimum number of drafts kept per wanted one."""
-BALANCE = (0.22, 0.28)
-"""Limits of the share of right answers for each letter."""
 
 
 def select(pool: Sequence[Draft], count: int, rng: np.random.Generator) -> list[Draft]:

@@ -79,8 +79,7 @@ class ColorMaker(StaticMaker):
             said = {_said(name or "") for name in named}
             if len(two) == 2 and None not in named and said != {"most"}:
                 slots = {"block": str(named[0]), "other": str(named[1])}
-                kind = next((one for one in ("most", "layer", "resting") if one in said), "")
-                yield Draft("co", scene, (picture,), slots, kind=f"co {kind}")
+                yield Draft("co", scene, (picture,), slots, kind=f"co {_said(' '.join(said))}")
 
     def right(self, asked: Draft) -> str:
         """Return the colors of the blocks that the text names."""

@@ -96,8 +96,21 @@ class PositionMaker(StaticMaker):
         """Compare the places of the blocks that the text or the options name."""
         blocks, picture = sight.named(asked), asked.picture
         if asked.wording in _PLACES:
-            place = _place(asked.wording, blocks[0], blocks[-1], picture.view_deg)
-            return _PLACES[asked.wording][place]
+            one, other = blocks[0], blocks[-1]
+            step = sight.center_m(one) - sight.center_m(other)
+            across, away = (float(step @ axis) for axis in _floor_axes(picture.view_deg))
+            places = _PLACES[asked.wording]
+            if asked.wording == "rp-corner":
+                if min(abs(across), abs(away)) < _CLEAR_M:
+                    raise UnfairError("is neither clearly to a side nor clearly in front or behind")
+                return places[2 * (away > 0) + (across > 0)]
+            low, high = bounds_m(one)[:, 2] - bounds_m(other)[::-1, 2]
+            if max(abs(across), abs(away)) < _ABOVE_M and (low > -_LEVEL_M or high < _LEVEL_M):
+                return places[int(low <= -_LEVEL_M)]
+            bottoms = abs(bounds_m(one)[0, 2] - bounds_m(other)[0, 2])
+            if abs(across) > _CLEAR_M and bottoms < _LEVEL_M:
+                return places[2 + (across > 0)]
+            raise UnfairError("is neither over, under nor beside it")
         four = sight.resolve_seen(asked.texts, picture)
         if asked.wording == "rp-extreme":
             extreme = asked.slots["extreme"]
@@ -110,8 +123,8 @@ class PositionMaker(StaticMaker):
             reach = [float(np.linalg.norm(sight.center_m(b) - middle)) for b in four]
             is_clear = min(reach) <= _NEARER * sorted(reach)[1]
         else:
-            away = _floor_axes(picture.view_deg)[1]
-            reach = [_RANKED[asked.wording](block, away) for block in four]
+            direction = _floor_axes(picture.view_deg)[1]
+            reach = [_RANKED[asked.wording](block, direction) for block in four]
             is_clear = sorted(reach)[1] - min(reach) >= _GAP_M
         if asked.wording in _UPRIGHT:
             sight.require_supports_seen(picture, four)
@@ -125,26 +138,6 @@ def _floor_axes(view: View) -> tuple[Floats, Floats]:
     right, _, forward = view_axes(*view)
     away = np.array([forward[0], forward[1], 0.0])
     return right, away / np.linalg.norm(away)
-
-
-def _place(stem: str, one: Block, other: Block, view: View) -> int:
-    """Return the index of the wording's place at which `one` is, as seen in the view from `other`.
-
-    Raises UnfairError if it is between these places.
-    """
-    step = sight.center_m(one) - sight.center_m(other)
-    across, away = (float(step @ axis) for axis in _floor_axes(view))
-    if stem == "rp-corner":
-        if min(abs(across), abs(away)) < _CLEAR_M:
-            raise UnfairError("is neither clearly to a side nor clearly in front or behind")
-        return int(2 * (away > 0) + (across > 0))
-    low, high = bounds_m(one)[:, 2] - bounds_m(other)[::-1, 2]
-    if max(abs(across), abs(away)) < _ABOVE_M and (low > -_LEVEL_M or high < _LEVEL_M):
-        return int(low <= -_LEVEL_M)
-    bottoms = abs(bounds_m(one)[0, 2] - bounds_m(other)[0, 2])
-    if abs(across) > _CLEAR_M and bottoms < _LEVEL_M:
-        return int(2 + (across > 0))
-    raise UnfairError("is neither over, under nor beside it")
 
 
 # AP

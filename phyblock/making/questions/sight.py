@@ -362,23 +362,21 @@ def resolve(text: str, picture: QuestionPicture, loosely: bool = False) -> tuple
     return tuple(orders_of(fitting))
 
 
-def resolve_one(text: str, picture: QuestionPicture) -> Block:
-    """Return the only block that an expression fits, even loosely. Raises UnfairError if not."""
-    orders = resolve(text, picture)
-    if len(orders) != 1:
-        raise UnfairError(f"{text!r} fits {len(orders)} blocks")
-    if resolve(text, picture, loosely=True) != orders:
-        raise UnfairError(f"{text!r} may be taken for another block")
-    return block_of(picture.blocks, orders[0])
-
-
 def resolve_seen(
     texts: Sequence[str], picture: QuestionPicture, least: float = NAMED
 ) -> list[Block]:
-    """Return the blocks that expressions fit. Raises UnfairError unless at least this share of
-    each is visible.
+    """Return the only block that each expression fits, even loosely.
+
+    Raises UnfairError if there is none or another, or less than this share of one is visible.
     """
-    blocks = [resolve_one(text, picture) for text in texts]
+    blocks = []
+    for text in texts:
+        orders = resolve(text, picture)
+        if len(orders) != 1:
+            raise UnfairError(f"{text!r} fits {len(orders)} blocks")
+        if resolve(text, picture, loosely=True) != orders:
+            raise UnfairError(f"{text!r} may be taken for another block")
+        blocks.append(block_of(picture.blocks, orders[0]))
     require_seen(picture, least, blocks)
     return blocks
 

@@ -18,7 +18,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from phyblock.domain.blocks import COLORS, Color
 from phyblock.domain.question import LETTERS, QuestionPicture, Subtask
@@ -80,11 +79,22 @@ def _colorings(
     """Propose four colorings from the second view, one of which the first picture shows."""
     red = tuple(replace(block, color="red") for block in scene.blocks)
     plain = [QuestionPicture("scene", red, view) for view in (first, second)]
+    # The visible pixels of each block in both views, shape (2, blocks), and of all blocks.
     pixels = np.array([[*shown_pixels(one, seen(one)).values()] for one in plain])
+    every = pixels.sum(axis=1, keepdims=True)
     for _ in range(_FAMILIES_TRIED):
         scene = replace(scene, blocks=sight.recolored(scene, first, rng).blocks)
         four = [scene.blocks, *(_exchanged(scene.blocks, rng) for _ in LETTERS[1:])]
-        if not _are_compared(four, pixels):
+        worn = np.array([[[b.color == one for one in COLORS] for b in blocks] for blocks in four])
+        differ = [(one != other).any(axis=1) for one, other in itertools.combinations(worn, 2)]
+        if (pixels @ np.array(differ).T / every).min() < _LEAST_SHARE:
+            continue
+        # Comparing the visible shares of colors, rounded to a thousandth, finds one of the four;
+        # ties count in part.
+        shares = np.round(np.tensordot(pixels, worn, axes=(1, 1)) / every[:, None], 3)
+        far = np.abs(shares[0][:, None, :] - shares[1][None, :, :]).sum(axis=2)
+        nearest = far <= far.min(axis=1, keepdims=True) + 1e-9
+        if round(float((np.diag(nearest) / nearest.sum(axis=1)).sum()), 6) != 1:
             continue
         shown, options = ([QuestionPicture("scene", b, v) for b in four] for v in (first, second))
         is_new = len({turned_form(blocks) for blocks in four}) == len(four)
@@ -104,23 +114,6 @@ def _exchanged(blocks: Sequence[Block], rng: np.random.Generator) -> tuple[Block
         drawn = base.shuffled(rng, [block.color for block in same])
         colors |= dict(zip(sight.orders_of(same), drawn, strict=True))
     return sight.colored(blocks, colors)
-
-
-def _are_compared(four: Sequence[Sequence[Block]], pixels: NDArray[np.int64]) -> bool:
-    """True if any two colorings differ in enough of the visible blocks, and comparing the visible
-    shares of colors, rounded to a thousandth, finds one of the four; ties count in part.
-
-    `pixels` shows each block in both views, shape (2, blocks).
-    """
-    worn = np.array([[[b.color == one for one in COLORS] for b in blocks] for blocks in four])
-    every = pixels.sum(axis=1, keepdims=True)
-    differ = [(one != other).any(axis=1) for one, other in itertools.combinations(worn, 2)]
-    is_unlike = (pixels @ np.array(differ).T / every).min() >= _LEAST_SHARE
-    first, second = np.round(np.tensordot(pixels, worn, axes=(1, 1)) / every[:, None], 3)
-    far = np.abs(first[:, None, :] - second[None, :, :]).sum(axis=2)
-    nearest = far <= far.min(axis=1, keepdims=True) + 1e-9
-    found = round(float((np.diag(nearest) / nearest.sum(axis=1)).sum()), 6)
-    return bool(is_unlike and found == 1)
 
 
 # OR

@@ -58,7 +58,18 @@ def make_candidates(
         message = "needs more different blocks than a candidate set holds"
         raise DataError(Problem(scene.id, message, "blocks", str(len(needed)), allowed))
     salt = f"{seed}/{scene.id}"
-    others = {one: rate for one, rate in _rates(palette).items() if one.look not in needed}
+    # The rate per unit of time at which each look that some goal needs is drawn as a distractor:
+    # the probability of being drawn within one unit gives the look its even share.
+    colors = Counter(block_type for block_type, _ in palette)
+    others: dict[Candidate, float] = {}
+    for block_type, color in palette:
+        added = dict.fromkeys(POSES[block_type], _EVEN_SHARE)
+        for pose, count in NEEDED.get(block_type, added).items():
+            share = count / colors[block_type]
+            drawn = min(share * (1 / _EVEN_SHARE - 1) / (1 - share), _MOST_DRAWN)
+            one = Candidate(block_type, color, POSES[block_type][pose])
+            if one.look not in needed:
+                others[one] = -math.log1p(-drawn) * _RARER.get(block_type, 1.0)
 
     def waiting(one: Candidate) -> float:
         """Draw a candidate's exponential waiting time (Efraimidis and Spirakis 2006)."""
@@ -69,22 +80,6 @@ def make_candidates(
 
     distractors = sorted(others, key=waiting)[: MAX_CANDIDATES - len(needed)]
     return CandidateSet(tuple(sorted([*needed.values(), *distractors], key=place)))
-
-
-def _rates(palette: tuple[Kind, ...]) -> dict[Candidate, float]:
-    """Return the rate per unit of time at which each look that some goal needs is drawn as a
-    distractor: the probability of being drawn within one unit gives the look its even share.
-    """
-    colors = Counter(block_type for block_type, _ in palette)
-    rates = {}
-    for block_type, color in palette:
-        added = dict.fromkeys(POSES[block_type], _EVEN_SHARE)
-        for pose, needed in NEEDED.get(block_type, added).items():
-            share = needed / colors[block_type]
-            drawn = min(share * (1 / _EVEN_SHARE - 1) / (1 - share), _MOST_DRAWN)
-            one = Candidate(block_type, color, POSES[block_type][pose])
-            rates[one] = -math.log1p(-drawn) * _RARER.get(block_type, 1.0)
-    return rates
 
 
 def _drawn(candidate: Candidate, salt: str) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
@@ -28,11 +28,11 @@ from phyblock.data.scenes import (
     StoredCandidate,
     candidate_set,
 )
-from phyblock.domain.blocks import KIT_PALETTE, Color
+from phyblock.domain.blocks import Color
 from phyblock.domain.scene import Block, CandidateSet, CycleError, Scene
 from phyblock.errors import DataError, Problem, SpecError
 from phyblock.making.checks import LEVEL_LIMITS, SceneFacts, findings_of
-from phyblock.making.scenes.sketch import Palette, scene_of
+from phyblock.making.scenes.sketch import scene_of
 from phyblock.records.record import Line, decode, validated
 
 _SUFFIXES = (".yaml", ".yml", ".json", ".jsonl")
@@ -143,12 +143,6 @@ def derived(name: str, given: GivenScene, where: str) -> Scene:
         scene = scene_of(name, (), sorted_blocks, given.parents)
     fitting = (n for n in LEVEL_LIMITS if n > 1 and len(scene) <= LEVEL_LIMITS[n].most_blocks)
     return replace(scene, levels=given.levels or (next(fitting, max(LEVEL_LIMITS)),))
-
-
-def palette_of(scenes: Sequence[Scene]) -> Palette:
-    """Return the palette for distractors: the kit's, if it has all blocks of the scenes."""
-    kinds = {block.kind for scene in scenes for block in scene.blocks}
-    return "kit" if kinds <= set(KIT_PALETTE) else "full"
 
 
 def read_given(path: Path) -> tuple[ReadScene, ...]:

@@ -165,10 +165,6 @@ class Draft:
         """Return one of the options, each equally likely."""
         return options[int(self.rng.integers(len(options)))]
 
-    def maybe(self, chance: float = 0.5) -> bool:
-        """Return True with the probability `chance`."""
-        return float(self.rng.random()) < chance
-
     def put(
         self,
         block_type: BlockType,
@@ -218,7 +214,7 @@ class Draft:
             if isinstance(step, list):
                 self.follow(self.pick(step), tone)
             elif isinstance(step, dict) and "maybe" in step:
-                is_done = self.maybe(step.get("chance", 0.5))
+                is_done = self.rng.random() < step.get("chance", 0.5)
                 self.follow(step["maybe"] if is_done else step.get("else", ""), tone)
             elif isinstance(step, dict):
                 parts: dict[str, list[Block]] = {}
