@@ -101,7 +101,6 @@ def read_official(root: Path) -> Dataset:
     if not goals:
         allowed = f"a checkout of the official PhyBlock repository, with {_GOALS.as_posix()}/*.json"
         raise DataError(Problem(str(root), "holds no official scenes", allowed=allowed))
-
     adapter = TypeAdapter(_Goal)
 
     def read(goal: Path, where: str) -> AssemblyTask:
@@ -166,67 +165,58 @@ class _Question(Line, extra="ignore"):
 
 def read_official_questions(folder: Path, scenes: Dataset) -> QuestionSet:
     """Return all questions of a folder, about these scenes. Raises DataError with all problems."""
-    files = sorted(folder.glob("*.json"))
-    if not files:
+    sets = sorted(folder.glob("*.json"))
+    if not sets:
         allowed = "question files such as SH.json, one a subtask"
         raise DataError(Problem(str(folder), "holds no question files", allowed=allowed))
     adapter: TypeAdapter[tuple[_Question, ...]] = TypeAdapter(tuple[_Question, ...])
     names = {name: s for s in SUBTASKS for name in (s.lower(), SUBTASK_NAMES[s].replace(" ", ""))}
     items = []
-    for path in files:
+    for path in sets:
         subtask = names.get(re.sub(r"[^a-z]+", "", path.stem.lower()))
         if subtask is None:
             allowed = ", ".join(SUBTASKS)
             raise DataError(Problem(str(path), "names no subtask", "the file", path.stem, allowed))
-        lines = decode(adapter, read_data(path), str(path))
-        for n, line in enumerate(lines):
+        for n, line in enumerate(decode(adapter, read_data(path), str(path))):
             name = line.id or f"{subtask.lower()}-{n + 1:03d}"
             items.append((f"{path}[{n}]", (name, subtask, line)))
 
     def read(item: tuple[str, Subtask, _Question], where: str) -> QuestionTask:
         name, subtask, line = item
         scene = scenes.task(line.scene_id, where, "scene_id").scene
-        shown_files = _pictures_of(name, line, folder, where)
+        # The picture of the scene may be missing.
+        wanted = {"scene": line.scene_id}
+        for letter, option in zip(LETTERS, line.options, strict=True):
+            wanted |= {letter: f"{name}/{option.strip('<>')}"} if is_picture_option(option) else {}
+        files: dict[str, Path] = {}
+        for label, picture in wanted.items():
+            paths = [folder / f"images/{picture}{ending}" for ending in (".png", ".jpg", ".jpeg")]
+            if path := next((path for path in paths if path.is_file()), None):
+                files[label] = path
+            elif label != "scene":
+                missing, allowed = "the file is missing", str(paths[0])
+                raise DataError(Problem(where, missing, "options", allowed=allowed))
+        # The right options are given as letters or as the options themselves.
+        is_order = subtask == "OR"
+        parts = [line.answer] if isinstance(line.answer, str) else list(line.answer)
+        if is_order and isinstance(line.answer, str):
+            parts = [letter for letter in line.answer if letter.isalnum()]
+        letters = {letter: n for n, letter in enumerate(LETTERS)}
+        places = {option: n for n, option in enumerate(line.options)}
+        texts = map(str.strip, parts)
+        found = [letters.get(text.strip("().").upper(), places.get(text)) for text in texts]
+        answer = tuple(n for n in found if n is not None)
+        if not len(set(answer)) == len(parts) == (len(LETTERS) if is_order else 1):
+            allowed = "all four letters or options" if is_order else "a letter or an option"
+            message = "is none of the options"
+            raise DataError(Problem(where, message, "answer", shown(line.answer), allowed))
         # The scene is drawn where it is not among the files.
         drawn = QuestionPicture("scene", scene.blocks, _GOAL_VIEW)
-        pictures = () if "scene" in shown_files or subtask == "OR" else (drawn,)
-        told = line.question, line.options, _answer_of(line, subtask, where), pictures
-        return QuestionTask(Question(name, subtask, scene, *told), shown_files)
+        pictures = () if "scene" in files or is_order else (drawn,)
+        question = Question(name, subtask, scene, line.question, line.options, answer, pictures)
+        return QuestionTask(question, files)
 
     return QuestionSet(folder.name, folder, read_each(items, read))
-
-
-def _pictures_of(name: str, line: _Question, folder: Path, where: str) -> dict[str, Path]:
-    """Return the picture files of a question by label; that of the scene may be missing."""
-    wanted = {"scene": line.scene_id}
-    options = zip(LETTERS, line.options, strict=True)
-    wanted |= {letter: f"{name}/{o.strip('<>')}" for letter, o in options if is_picture_option(o)}
-    files: dict[str, Path] = {}
-    for label, picture in wanted.items():
-        paths = [folder / f"images/{picture}{ending}" for ending in (".png", ".jpg", ".jpeg")]
-        if path := next((path for path in paths if path.is_file()), None):
-            files[label] = path
-        elif label != "scene":
-            raise DataError(Problem(where, "the file is missing", "options", allowed=str(paths[0])))
-    return files
-
-
-def _answer_of(line: _Question, subtask: Subtask, where: str) -> tuple[int, ...]:
-    """Return the indices of the right options, given as letters or as the options themselves."""
-    is_order = subtask == "OR"
-    parts = [line.answer] if isinstance(line.answer, str) else list(line.answer)
-    if is_order and isinstance(line.answer, str):
-        parts = [letter for letter in line.answer if letter.isalnum()]
-    letters = {letter: n for n, letter in enumerate(LETTERS)}
-    options = {option: n for n, option in enumerate(line.options)}
-    texts = map(str.strip, parts)
-    found = [letters.get(text.strip("().").upper(), options.get(text)) for text in texts]
-    answer = tuple(n for n in found if n is not None)
-    if not len(set(answer)) == len(parts) == (len(LETTERS) if is_order else 1):
-        allowed = "all four letters or options" if is_order else "a letter or an option"
-        message = "is none of the options"
-        raise DataError(Problem(where, message, "answer", shown(line.answer), allowed))
-    return answer
 
 
 _TOKEN = re.compile(r"[a-z]+|[0-9]+|[^\W_]+")

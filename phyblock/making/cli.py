@@ -62,7 +62,7 @@ from phyblock.sim.pictures import (
 from phyblock.sim.question_pictures import question_png
 from phyblock.sim.raster import VIEWS
 from phyblock.text import counted, did_you_mean, hex_digest
-from phyblock.tracks.difficulty import MEASURES
+from phyblock.tracks.base import DIFFICULTY
 from phyblock.types import BACKGROUNDS
 from phyblock.workers import Shards, Workers, open_workers
 
@@ -385,7 +385,7 @@ def show_scene(data: str, scene: str) -> None:
     size = f"{counted(len(shown), 'block')} · {counted(max(shown.graph.layers), 'layer')}"
     heading = f"scene {shown.id} · level {levels} · {size} · made from {parents}"
     console.print(heading, soft_wrap=True)
-    numbers = (f"{name} {measure(task):.3g}" for name, measure in MEASURES.items())
+    numbers = (f"{name} {measure(task):.3g}" for name, measure in DIFFICULTY.items())
     console.print(f"difficulty: {' · '.join(numbers)}", soft_wrap=True)
     seen = visible_shares(shown, PictureStyle())
     blocks = [

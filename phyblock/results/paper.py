@@ -56,16 +56,6 @@ def published_frame(run: Run) -> pd.DataFrame:
     return found[_COLUMNS]
 
 
-def is_as_published(run: Run) -> bool:
-    """True if a run is scored as in the paper's Table 1."""
-    suite = run.design.suite
-    return (
-        "paper" in suite.scoring.matchers
-        and (1 not in suite.levels or suite.scoring.level1 == "membership")
-        and _SETTING in suite.settings
-    )
-
-
 def beside_paper(run: Run) -> TextTable | None:
     """Return our numbers beside the paper's Table 1; None if it has no model of the run, or the run
     is not on the official scenes.

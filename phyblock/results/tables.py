@@ -17,7 +17,7 @@ from phyblock.registry import added_measures
 from phyblock.results.compare import rank_ranges_of, rank_text, sensitivity_table, sides_of
 from phyblock.results.estimates import Headline, Value, shown_values, track_notes
 from phyblock.results.load import TOKENS, Run, load_run, track_measures
-from phyblock.results.paper import beside_paper, is_as_published
+from phyblock.results.paper import beside_paper
 from phyblock.results.text import (
     NO_VALUE,
     TABLES,
@@ -293,7 +293,10 @@ def make_tables(run: Run, names: Sequence[str] | None = None) -> dict[str, TextT
         for name, layout in _layouts(run, track).items():
             if name in wanted:
                 made[name] = filled(run, track, layout)
-    if "published" in wanted and (names is not None or is_as_published(run)):
+    scoring, is_a = run.design.suite.scoring, "A" in run.design.suite.settings
+    is_level1_alike = 1 not in run.design.suite.levels or scoring.level1 == "membership"
+    is_as_published = is_a and "paper" in scoring.matchers and is_level1_alike
+    if "published" in wanted and (names is not None or is_as_published):
         made["published"] = beside_paper(run)
     if "sensitivity" in wanted:
         made["sensitivity"] = sensitivity_table(run)

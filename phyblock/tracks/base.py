@@ -10,9 +10,10 @@ from __future__ import annotations
 import asyncio
 import functools
 import json
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, ClassVar, Literal, Protocol, TypeVar
@@ -22,16 +23,17 @@ from pydantic import BaseModel, create_model
 from phyblock.config.suite import Suite
 from phyblock.config.validation import PictureControls
 from phyblock.data.base import Dataset
-from phyblock.domain.scene import AssemblyTask, CandidateSet, Scene
+from phyblock.domain.scene import AOVGraph, AssemblyTask, CandidateSet, Oriented, Plan, Scene
 from phyblock.errors import DataError, Problem, SpecError
 from phyblock.models.request import Image, Message, Request
 from phyblock.parsing.text import AnswerForm
 from phyblock.records.record import Record, Reply, SentPrompt
 from phyblock.registry import added_measures, known_track, known_tracks
+from phyblock.scoring.plan import Goal, match_plan
 from phyblock.sim.engine import REFERENCE_ENGINE, engine_version, physics_engine
+from phyblock.sim.pictures import GRID_COLUMNS
 from phyblock.text import drawn_bytes, hex_digest
 from phyblock.tracks.measures import SampleCounts, TrackReport, read_report
-from phyblock.tracks.picking import Picking
 from phyblock.tracks.pictures import Drawing, Workshop, scene_drawings
 from phyblock.tracks.prompts import Prompt, TemplatePrompt
 from phyblock.types import AnswerFormat, CandidateOrder
@@ -82,6 +84,105 @@ class Episode(Protocol):
 
     def judgement(self) -> Judgement:
         """Return the judgement of the replies; its fields hold `turns`, one mapping per reply."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One thing to pick: its name in the prompt, and its text if it has one.
+
+    It is in the last picture of each label: the whole picture, or `cell`, from 0, of the grid in
+    the square at the right end.
+    """
+
+    name: str
+    text: str = ""
+    labels: tuple[str, ...] = ()
+    cell: int | None = None
+
+    def box(self, width_px: int, height_px: int) -> tuple[float, float, float, float]:
+        """Return left, top, width and height in a picture of this size, as shares of its sides."""
+        if self.cell is None:
+            return (0.0, 0.0, 1.0, 1.0)
+        row, column = divmod(self.cell, GRID_COLUMNS)
+        side = min(width_px, height_px) / width_px
+        width = side / GRID_COLUMNS
+        return (1 - side + column * width, row / GRID_COLUMNS, width, 1 / GRID_COLUMNS)
+
+
+@dataclass(frozen=True)
+class NumberField:
+    """A number that goes with every pick: its name and unit, from `-most` to `most` with at most
+    `decimals` decimals. Keys change it by `step`, or by `leap`.
+    """
+
+    name: str
+    unit: str
+    most: float
+    decimals: int
+    step: float
+    leap: float
+
+
+@dataclass(frozen=True)
+class Pick:
+    """A choice, by its place among them from 0, and the numbers that go with it."""
+
+    place: int
+    numbers: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class Picking:
+    """An answer made of choices that are picked one after another.
+
+    `least` to `most` are picked, with `repeats` any of them repeatedly; `noun` is the name of one
+    pick. `fields` are the numbers that go with each. `write` makes the reply in the form that the
+    prompt asks for. `task` says in one line what to do.
+    """
+
+    choices: tuple[Choice, ...]
+    least: int
+    most: int
+    repeats: bool
+    noun: str
+    write: Callable[[Sequence[Pick]], str]
+    fields: tuple[NumberField, ...] = ()
+    task: str = ""
+
+    def without_cells(self) -> Picking:
+        """Return the same with choices that are whole pictures."""
+        plain = (one if one.cell is None else Choice(one.name, one.text) for one in self.choices)
+        return replace(self, choices=tuple(plain))
+
+    def reply(self, picks: Sequence[Pick]) -> str:
+        """Return the reply made of picks.
+
+        Raises ValueError for too few or too many, unknown places, repeats that are not allowed,
+        and numbers that are missing or not allowed.
+        """
+        places = [pick.place for pick in picks]
+        is_answer = (
+            self.least <= len(picks) <= self.most
+            and all(0 <= place < len(self.choices) for place in places)
+            and (self.repeats or len(set(places)) == len(places))
+            and all(len(pick.numbers) == len(self.fields) for pick in picks)
+            and all(
+                # NaN is refused.
+                abs(value) <= field.most and abs(value - round(value, field.decimals)) <= 1e-9
+                for pick in picks
+                for field, value in zip(self.fields, pick.numbers, strict=True)
+            )
+        )
+        if not is_answer:
+            raise ValueError("holds picks that make no answer")
+        return self.write(picks)
+
+
+def candidate_choices(
+    n_candidates: int, labels: tuple[str, ...] = ("composite", "candidates")
+) -> tuple[Choice, ...]:
+    """Return the numbered candidates of a scene as choices in the pictures with these labels."""
+    return tuple(Choice(str(n + 1), "", labels, n) for n in range(n_candidates))
 
 
 class Track(ABC):
@@ -374,15 +475,60 @@ class SceneTrack(Track):
         }
 
 
+def log_orders(graph: AOVGraph) -> float:
+    """Return the decimal logarithm of a lower bound on the number of valid orders.
+
+    The bound is n! divided, for each block, by the number of blocks that need it (or that it
+    needs), itself included: exact if no block rests on two others, or no two rest on one.
+    """
+    needed = [0] * len(graph)
+    for vertex in sorted(range(len(graph)), key=graph.layers.__getitem__):
+        needed[vertex] = 1 << vertex
+        for other in graph.depends_on[vertex]:
+            needed[vertex] |= needed[other]
+    below = [mask.bit_count() for mask in needed]
+    above = [sum(mask >> vertex & 1 for mask in needed) for vertex in range(len(graph))]
+    most = max(-math.log10(math.prod(sizes)) for sizes in (below, above))
+    return math.log10(math.factorial(len(graph))) + most
+
+
+def distractor_distance(task: AssemblyTask) -> float:
+    """Return in how many of type, color and orientation the nearest distractor differs from a
+    needed look, averaged over needed looks; 3 without distractors.
+    """
+    needed = {block.look: block for block in task.scene.blocks}
+    others = [one for one in task.candidates.candidates if one.look not in needed]
+
+    def apart(one: Oriented, other: Oriented) -> int:
+        is_turned = one.look[2] != other.look[2] or one.type != other.type
+        return (one.type != other.type) + (one.color != other.color) + is_turned
+
+    nearest = [min((apart(one, other) for other in others), default=3) for one in needed.values()]
+    return sum(nearest) / len(nearest)
+
+
+def _blind_f1(task: AssemblyTask) -> float:
+    plan = Plan(tuple(range(1, len(task.candidates) + 1)))
+    return match_plan(Goal(task.scene, task.candidates, "A"), plan, "optimal").counts.f1 or 0.0
+
+
+DIFFICULTY: Mapping[str, Callable[[AssemblyTask], float]] = {
+    "blocks": lambda task: len(task.scene),
+    "depth": lambda task: max(task.scene.graph.layers),
+    "orders": lambda task: log_orders(task.scene.graph),
+    "blind": _blind_f1,
+    "distractor": distractor_distance,
+}
+"""Measures of the difficulty of a scene, by the names in `DifficultySpec`."""
+
+
 def select_tasks(
     tasks: Sequence[AssemblyTask], suite: Suite, limit: int | None
 ) -> tuple[AssemblyTask, ...]:
     """Return the tasks of a suite's levels and difficulty, at most `limit`, in their order."""
     chosen = [task for task in tasks if set(suite.levels) & set(task.scene.levels)]
-    if suite.dataset.difficulty.ranges:
-        from phyblock.tracks.difficulty import is_within  # Few suites need it.
-
-        chosen = [task for task in chosen if is_within(task, suite.dataset.difficulty)]
+    for name, (low, high) in suite.dataset.difficulty.ranges.items():
+        chosen = [task for task in chosen if low <= DIFFICULTY[name](task) <= high]
     return limited(chosen, [task.scene.level for task in chosen], limit)
 
 

@@ -210,35 +210,30 @@ def scene_drawings(task: AssemblyTask, images: ImagesSpec) -> tuple[Drawing, ...
     They are drawn, or cut out of the data set's own composites. A goal that is not shown does not
     affect the size. Raises DataError if the data set lacks a picture that it must provide.
     """
-    made = _own(task) if images.source == "dataset" else _drawn(task, images)
+    if images.source == "render":
+        style = picture_style(images)
+        style = style if task.is_blind else goal_style(task.scene, style)
+        goal = Drawing.of("goal", goal_key, goal_png, task.scene, style)
+        grid = Drawing.of("candidates", candidates_key, candidates_png, task.candidates, style)
+        key, join = hex_digest(f"composite {goal.key} {grid.key}"), partial(_joined, goal, grid)
+        both = Drawing("composite", key, join, joined_size_px(style.size_px))
+        made = {one.label: one for one in (goal, grid, both)}
+    elif (path := task.composite) is not None:
+        makes = {"goal": partial(_half, path, is_goal=True), "candidates": partial(_half, path)}
+        makes["composite"] = partial(read_picture, path)
+        key = hex_digest(read_picture(path))
+        made = {label: Drawing(label, key, make, is_file=True) for label, make in makes.items()}
+    else:
+        message, hint = "the data set has no picture of it", "use images.source: render"
+        raise DataError(Problem(f"scene {task.key}", message, "images.source", hint=hint))
     if task.is_blind:
         return (made["candidates"],)
     labels = ("composite",) if images.layout == "composite" else images.order
     return tuple(made[label] for label in labels)
 
 
-def _drawn(task: AssemblyTask, images: ImagesSpec) -> dict[str, Drawing]:
-    style = picture_style(images)
-    style = style if task.is_blind else goal_style(task.scene, style)
-    goal = Drawing.of("goal", goal_key, goal_png, task.scene, style)
-    grid = Drawing.of("candidates", candidates_key, candidates_png, task.candidates, style)
-    key, join = hex_digest(f"composite {goal.key} {grid.key}"), partial(_joined, goal, grid)
-    both = Drawing("composite", key, join, joined_size_px(style.size_px))
-    return {one.label: one for one in (goal, grid, both)}
-
-
 def _joined(goal: Drawing, grid: Drawing) -> bytes:
     return composite_png(goal.make(), grid.make())
-
-
-def _own(task: AssemblyTask) -> dict[str, Drawing]:
-    if (path := task.composite) is None:
-        message, hint = "the data set has no picture of it", "use images.source: render"
-        raise DataError(Problem(f"scene {task.key}", message, "images.source", hint=hint))
-    makes = {"goal": partial(_half, path, is_goal=True), "candidates": partial(_half, path)}
-    makes["composite"] = partial(read_picture, path)
-    key = hex_digest(read_picture(path))
-    return {label: Drawing(label, key, make, is_file=True) for label, make in makes.items()}
 
 
 def _half(composite: Path, *, is_goal: bool = False) -> bytes:

@@ -41,10 +41,18 @@ from phyblock.sim.engine import Pose, described_engine
 from phyblock.sim.geometry import box_height_cm, center_cm, origin_m, put
 from phyblock.sim.pictures import goal_style, kit_key, kit_png, ruled_key, ruled_png, written_style
 from phyblock.text import plain_sum
-from phyblock.tracks.base import CARRYING, ENGINE, Judgement, SceneTrack
+from phyblock.tracks.base import (
+    CARRYING,
+    ENGINE,
+    Judgement,
+    NumberField,
+    Pick,
+    Picking,
+    SceneTrack,
+    candidate_choices,
+)
 from phyblock.tracks.full_planning import PlanParse, PlanSubject, needed_candidate
 from phyblock.tracks.measures import SampleCounts, level_cells
-from phyblock.tracks.picking import NumberField, Pick, Picking, candidate_choices
 from phyblock.tracks.pictures import Drawing, picture_style
 from phyblock.types import REFUSED_ENDS, STEP_ENDS, Matcher, Setting, StepEnd, View
 
@@ -354,38 +362,6 @@ def _random(subject: PlanSubject, rng: np.random.Generator) -> str:
     return written(steps)
 
 
-POSE_RULES: Mapping[str, Callable[..., str]] = {
-    "random": _random,
-    "oracle": _built,
-    "oracle-noise-1mm": _noisy(0.1),
-    "oracle-noise-3mm": _noisy(0.3),
-    "oracle-noise-1cm": _noisy(1.0),
-    "oracle-2d": lambda subject, rng: _built(
-        subject, rng, lambda block, center: (*center[:2], box_height_cm(block) / 2)
-    ),
-    "stack": _stack,
-}
-
-
-def pick_poses(subject: PlanSubject) -> Picking:
-    """Return the choices of a person: any candidates, each as often as needed, with its place."""
-
-    def write(picks: Sequence[Pick]) -> str:
-        placed = ((pick.place + 1, pick.numbers) for pick in picks)
-        return written(PoseStep(number, (x, y, z)) for number, (x, y, z) in placed)
-
-    return Picking(
-        candidate_choices(len(subject.candidates), (KIT_LABEL,)),
-        least=1,
-        most=MOST_POSE_STEPS,
-        repeats=True,
-        noun="step",
-        write=write,
-        fields=tuple(NumberField(name, "cm", FARTHEST_PLACE_CM, 2, 0.5, 5.0) for name in "xyz"),
-        task="Pick the blocks that build the goal, in order, and say where the center of each is.",
-    )
-
-
 def _right(record: PoseRecord) -> tuple[float, ...] | None:
     if (pose := record.pose) is None:
         return None
@@ -423,13 +399,6 @@ _FITS = ("position_cm", "turn_deg", "iou")
 _WHOLE_COUNTS = ("steps", "reached", "blocks", "iou", "completed", "plans")
 _RIGHT = tuple(f"{frame}_{cm:g}" for frame in POSE_FRAMES for cm in TOLERANCES_CM)
 FITS = SampleCounts("fits", (*_FITS, "n"), record=_fits)
-COUNTS = (
-    SampleCounts("poses", (*_RIGHT, "steps", "blocks"), record=_right),
-    FITS,
-    SampleCounts("carried", (*STEP_ENDS, *POSE_ERRORS, *_WHOLE_COUNTS), record=_ends, same=_SAME),
-    _plan("A"),
-    _plan("B"),
-)
 
 
 class PosePlanning(SceneTrack):
@@ -440,15 +409,52 @@ class PosePlanning(SceneTrack):
     section = "pose"
     options = PoseSpec
     template = bundled("prompts", "pose_planning.j2")
-    baselines = POSE_RULES
-    by_hand = staticmethod(pick_poses)
+    baselines: ClassVar = {
+        "random": _random,
+        "oracle": _built,
+        "oracle-noise-1mm": _noisy(0.1),
+        "oracle-noise-3mm": _noisy(0.3),
+        "oracle-noise-1cm": _noisy(1.0),
+        "oracle-2d": lambda subject, rng: _built(
+            subject, rng, lambda block, center: (*center[:2], box_height_cm(block) / 2)
+        ),
+        "stack": _stack,
+    }
     record = PoseRecord
-    counted = COUNTS
+    counted = (
+        SampleCounts("poses", (*_RIGHT, "steps", "blocks"), record=_right),
+        FITS,
+        SampleCounts(
+            "carried", (*STEP_ENDS, *POSE_ERRORS, *_WHOLE_COUNTS), record=_ends, same=_SAME
+        ),
+        _plan("A"),
+        _plan("B"),
+    )
     results: ClassVar = {"cells": level_cells}
     varies = ("prompt", "background", "candidate_order", "repeats")
     simulates = True
     draws = True
     spec: PoseSpec
+
+    @staticmethod
+    def by_hand(subject: PlanSubject) -> Picking:
+        """Return the choices of a person: any candidates, repeatedly, each with its place."""
+
+        def write(picks: Sequence[Pick]) -> str:
+            placed = ((pick.place + 1, pick.numbers) for pick in picks)
+            return written(PoseStep(number, (x, y, z)) for number, (x, y, z) in placed)
+
+        return Picking(
+            candidate_choices(len(subject.candidates), (KIT_LABEL,)),
+            least=1,
+            most=MOST_POSE_STEPS,
+            repeats=True,
+            noun="step",
+            write=write,
+            fields=tuple(NumberField(name, "cm", FARTHEST_PLACE_CM, 2, 0.5, 5.0) for name in "xyz"),
+            task="Pick the blocks that build the goal, in order, and say where the center of each "
+            "is.",
+        )
 
     def draw(self, item: AssemblyTask) -> tuple[Drawing, ...]:
         """Return the goal from two views, unless blind, and the sheet of candidates."""

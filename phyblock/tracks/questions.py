@@ -42,9 +42,8 @@ from phyblock.scoring.plan import chance
 from phyblock.sim.pictures import PictureStyle
 from phyblock.sim.question_pictures import question_key, question_png
 from phyblock.text import hex_digest
-from phyblock.tracks.base import Judgement, Track, limited, select_tasks
+from phyblock.tracks.base import Choice, Judgement, Picking, Track, limited, select_tasks
 from phyblock.tracks.measures import OVERALL, WHOLE, Cell, SampleCounts
-from phyblock.tracks.picking import Choice, Picking
 from phyblock.tracks.pictures import Drawing, picture_style
 from phyblock.types import Background, DataFormat
 
@@ -204,11 +203,6 @@ def _guessing(suite: Suite, cell: str) -> float:
 
 _SAME = ("suite.vqa.circular", "tracks.vqa.questions")
 _COLUMNS = (*(f"{kind}_{letter.lower()}" for kind, letter in _LETTERS), "n")
-COUNTS = (
-    SampleCounts("answer", ("correct", "n"), record=_answer, parts=_rotations, same=_SAME),
-    SampleCounts("rotations", ("correct", "n"), record=_answer, same=_SAME),
-    SampleCounts("letters", _COLUMNS, record=_letters, cells=(WHOLE,), same=_SAME),
-)
 
 
 @dataclass(frozen=True)
@@ -301,32 +295,6 @@ def _random(subject: ChoiceSubject, rng: np.random.Generator) -> str:
     return choice_text(rng.permutation(n).tolist() if is_ordering else [int(rng.integers(n))])
 
 
-CHOICE_RULES: Mapping[str, Callable[..., str]] = {
-    "random": _random,
-    "oracle": lambda subject, _: choice_text(subject.question.answer),
-    "majority": lambda subject, _: choice_text(subject.guess()),
-}
-
-
-def pick_answer(subject: ChoiceSubject) -> Picking:
-    """Return the choices of a person: the options, as texts or pictures."""
-    options, is_ordering = subject.question.options, subject.question.subtask == "OR"
-    picked = len(options) if is_ordering else 1
-    choices = tuple(
-        Choice(letter, labels=(letter,)) if is_picture_option(option) else Choice(letter, option)
-        for letter, option in zip(LETTERS, options, strict=False)
-    )
-    return Picking(
-        choices,
-        least=picked,
-        most=picked,
-        repeats=False,
-        noun="place" if is_ordering else "option",
-        write=lambda picks: choice_text([pick.place for pick in picks]),
-        task=subject.question.text,
-    )
-
-
 @dataclass(frozen=True)
 class AskedQuestion:
     """A question with its options in one order; `rotation` 0 is that of the data set."""
@@ -383,13 +351,41 @@ class Vqa(Track):
     section = name
     options = VqaSpec
     template = bundled("prompts", "vqa.j2")
-    baselines = CHOICE_RULES
-    by_hand = staticmethod(pick_answer)
+    baselines: ClassVar = {
+        "random": _random,
+        "oracle": lambda subject, _: choice_text(subject.question.answer),
+        "majority": lambda subject, _: choice_text(subject.guess()),
+    }
     record = ChoiceRecord
-    counted = COUNTS
+    counted = (
+        SampleCounts("answer", ("correct", "n"), record=_answer, parts=_rotations, same=_SAME),
+        SampleCounts("rotations", ("correct", "n"), record=_answer, same=_SAME),
+        SampleCounts("letters", _COLUMNS, record=_letters, cells=(WHOLE,), same=_SAME),
+    )
     results: ClassVar = {"cells": cells_of, "chance": _guessing, "part_names": SUBTASK_NAMES}
     varies = ("prompt", "background", "repeats")
     spec: VqaSpec
+
+    @staticmethod
+    def by_hand(subject: ChoiceSubject) -> Picking:
+        """Return the choices of a person: the options, as texts or pictures."""
+        options, is_ordering = subject.question.options, subject.question.subtask == "OR"
+        picked = len(options) if is_ordering else 1
+        choices = tuple(
+            Choice(letter, labels=(letter,))
+            if is_picture_option(option)
+            else Choice(letter, option)
+            for letter, option in zip(LETTERS, options, strict=False)
+        )
+        return Picking(
+            choices,
+            least=picked,
+            most=picked,
+            repeats=False,
+            noun="place" if is_ordering else "option",
+            write=lambda picks: choice_text([pick.place for pick in picks]),
+            task=subject.question.text,
+        )
 
     def open(self) -> None:
         """Select questions. Raises SpecError if there are none."""

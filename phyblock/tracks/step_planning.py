@@ -30,11 +30,16 @@ from phyblock.sim.dynamics import DEFAULT_TRIAL, ONE_SETTING, settle
 from phyblock.sim.engine import described_engine
 from phyblock.sim.pictures import goal_style
 from phyblock.sim.question_pictures import question_key, question_png, state_picture
-from phyblock.tracks.base import ENGINE, Judgement, SceneTrack
-from phyblock.tracks.full_planning import POSE_COUNTS, PlanParse, PlanSubject
-from phyblock.tracks.goal_blind import blind_guesses
+from phyblock.tracks.base import (
+    ENGINE,
+    Choice,
+    Judgement,
+    Picking,
+    SceneTrack,
+    candidate_choices,
+)
+from phyblock.tracks.full_planning import POSE_COUNTS, PlanParse, PlanSubject, blind_guesses
 from phyblock.tracks.measures import SampleCounts
-from phyblock.tracks.picking import Choice, Picking, candidate_choices
 from phyblock.tracks.pictures import Drawing, Workshop, picture_style
 from phyblock.tracks.prompts import TemplatePrompt
 from phyblock.types import Gating, Physics, Setting
@@ -173,11 +178,6 @@ def _random(subject: StepSubject, rng: np.random.Generator) -> str:
     return step_text(int(rng.integers(1, len(subject.candidates) + 1)))
 
 
-def _repeat(subject: StepSubject, rng: np.random.Generator) -> str:
-    failed = subject.last_failed
-    return _random(subject, rng) if failed is None else step_text(failed)
-
-
 def _right_move(
     choose: Callable[[StepSubject, int, np.random.Generator], int | None],
 ) -> Callable[[StepSubject, np.random.Generator], str]:
@@ -210,34 +210,6 @@ def _in_turn(plan_of: Callable[[StepSubject], Sequence[int]]) -> Callable[..., s
         return step_text(plan[subject.step] if subject.step < len(plan) else None)
 
     return rule
-
-
-STEP_RULES: Mapping[str, Callable[..., str]] = {
-    "random": _random,
-    "oracle": _right_move(lambda *_: None),
-    "oracle-no-orientation": _right_move(_turned),
-    "repeat": _repeat,
-    "all-candidates": _in_turn(lambda subject: range(1, len(subject.candidates) + 1)),
-    "goal-blind": _in_turn(lambda subject: subject.guess().steps),
-    "color-areas": _in_turn(lambda subject: subject.guess(sees_colors=True).steps),
-    "first-pose": _right_move(
-        lambda subject, index, _: subject.candidates.first_of(subject.candidates[index].kind)
-    ),
-}
-
-
-def pick_step(subject: StepSubject) -> Picking:
-    """Return the choices of a person: the candidates, then Done."""
-    n = len(subject.candidates)
-    return Picking(
-        (*candidate_choices(n), Choice("Done", "the goal is complete")),
-        least=1,
-        most=1,
-        repeats=False,
-        noun="step",
-        write=lambda picks: step_text(picks[0].place + 1 if picks[0].place < n else None),
-        task="Pick the next block to place, or Done when the goal is complete.",
-    )
 
 
 _REASONS: Mapping[str, str] = {
@@ -295,13 +267,6 @@ _EPISODES = (
     *(f"ended_{name}" for name in ENDINGS),
     *(f"step_{name}" for name in STEP_OUTCOMES),
 )
-COUNTS = (
-    SampleCounts(
-        "moves", ("tp", "fp", "fn"), score=lambda one: (one.tp, one.fp, one.fn), same=_SAME
-    ),
-    SampleCounts("episodes", _EPISODES, record=_episodes, same=_SAME),
-    POSE_COUNTS,
-)
 
 
 class StepPlanning(SceneTrack):
@@ -313,15 +278,47 @@ class StepPlanning(SceneTrack):
     section = "steps"
     options = StepsSpec
     template = bundled("prompts", "step_planning.j2")
-    baselines = STEP_RULES
-    by_hand = staticmethod(pick_step)
+    baselines: ClassVar = {
+        "random": _random,
+        "oracle": _right_move(lambda *_: None),
+        "oracle-no-orientation": _right_move(_turned),
+        "repeat": lambda subject, rng: (
+            _random(subject, rng) if subject.last_failed is None else step_text(subject.last_failed)
+        ),
+        "all-candidates": _in_turn(lambda subject: range(1, len(subject.candidates) + 1)),
+        "goal-blind": _in_turn(lambda subject: subject.guess().steps),
+        "color-areas": _in_turn(lambda subject: subject.guess(sees_colors=True).steps),
+        "first-pose": _right_move(
+            lambda subject, index, _: subject.candidates.first_of(subject.candidates[index].kind)
+        ),
+    }
     record = EpisodeRecord
-    counted = COUNTS
+    counted = (
+        SampleCounts(
+            "moves", ("tp", "fp", "fn"), score=lambda one: (one.tp, one.fp, one.fn), same=_SAME
+        ),
+        SampleCounts("episodes", _EPISODES, record=_episodes, same=_SAME),
+        POSE_COUNTS,
+    )
     varies = ("prompt", "background", "view", "candidate_order", "layout", "repeats")
     plays = True
     simulates = True
     draws = True
     spec: StepsSpec
+
+    @staticmethod
+    def by_hand(subject: StepSubject) -> Picking:
+        """Return the choices of a person: the candidates, then Done."""
+        n = len(subject.candidates)
+        return Picking(
+            (*candidate_choices(n), Choice("Done", "the goal is complete")),
+            least=1,
+            most=1,
+            repeats=False,
+            noun="step",
+            write=lambda picks: step_text(picks[0].place + 1 if picks[0].place < n else None),
+            task="Pick the next block to place, or Done when the goal is complete.",
+        )
 
     def open(self) -> None:
         """Select scenes."""

@@ -26,7 +26,7 @@ from pydantic import BaseModel, ConfigDict
 
 from phyblock.errors import Problem, SpecError, reason_of
 from phyblock.files import load_json
-from phyblock.tracks.picking import Pick
+from phyblock.tracks.base import Pick
 from phyblock.web.pack import asset
 from phyblock.web.session import NotNowError, PlaySession
 

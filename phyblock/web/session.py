@@ -29,8 +29,7 @@ from phyblock.records.record import Reply, Usage
 from phyblock.run.plan import RunPlan, make_plan
 from phyblock.run.runner import RunEvent, RunResult, RunStarted, SampleDone, Session
 from phyblock.run.store import begun, judge_reply
-from phyblock.tracks.base import SceneTrack, kind_of
-from phyblock.tracks.picking import Pick, Picking
+from phyblock.tracks.base import Pick, Picking, SceneTrack, kind_of
 from phyblock.web.ending import Ending, went
 
 _NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]{0,39}")

@@ -12,7 +12,7 @@ from phyblock.errors import DataError
 from phyblock.making.scenes.candidates import NEEDED, make_candidates
 from phyblock.making.scenes.production import Request, draw, shares
 from phyblock.making.scenes.sketch import POSES
-from phyblock.tracks.goal_blind import goal_blind_plans
+from phyblock.tracks.full_planning import goal_blind_plans
 from phyblock.types import SETTINGS
 from tests.scoring.cases import plans_f1
 from tests.shipped import TASKS

@@ -15,7 +15,7 @@ from phyblock.errors import DataError, RefusedError, SampleError
 from phyblock.models.client import read_raw_reply
 from phyblock.models.model import build_model
 from phyblock.records.record import Reply, Usage
-from phyblock.tracks.full_planning import PLAN_RULES, PlanSubject
+from phyblock.tracks.full_planning import FullPlanning, PlanSubject
 from tests.data.broken import plan_record
 from tests.fuzz.strategies import documents
 from tests.models.factory import CANDIDATES, SCENE, make_request
@@ -200,7 +200,7 @@ def test_any_document_is_read_or_refused_with_a_data_error(raw):
         text.encode()
 
 
-PLANNERS = list(PLAN_RULES)
+PLANNERS = list(FullPlanning.baselines)
 keys = st.text(min_size=1, max_size=5)
 seeds = st.integers(0, 10**6)
 

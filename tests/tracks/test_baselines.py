@@ -16,19 +16,28 @@ from phyblock.parsing.move import parse_move
 from phyblock.parsing.plan import parse_plan, parse_poses
 from phyblock.scoring.plan import Goal
 from phyblock.sim.pictures import joined_size_px
-from phyblock.tracks import goal_blind
-from phyblock.tracks.full_planning import PlanSubject, pick_plan
-from phyblock.tracks.picking import Choice, Pick, Picking
-from phyblock.tracks.pose_planning import pick_poses
+from phyblock.tracks.base import Choice, Pick, Picking
+from phyblock.tracks.full_planning import (
+    AREA_KEYS,
+    KEYS,
+    FullPlanning,
+    PlanSubject,
+    chances,
+    color_areas,
+    goal_blind_plans,
+    related,
+    units,
+)
+from phyblock.tracks.pose_planning import PosePlanning
 from phyblock.tracks.questions import (
     FOLDS,
     ChoiceSubject,
     Folds,
+    Vqa,
     guesses_of,
     majority_rule,
-    pick_answer,
 )
-from phyblock.tracks.step_planning import StepSubject, pick_step
+from phyblock.tracks.step_planning import StepPlanning, StepSubject
 from tests.scoring.cases import plans_f1
 from tests.shipped import TASKS
 
@@ -132,7 +141,7 @@ def drawn_sets(draw):
 @settings(max_examples=25)
 def test_a_plan_names_candidates_of_its_set(drawn, setting, repeats):
     scenes, sets = drawn
-    plans = goal_blind.goal_blind_plans(scenes, sets, setting, repeats=repeats)
+    plans = goal_blind_plans(scenes, sets, setting, repeats=repeats)
     assert set(plans) == set(sets)
     for name, plan in plans.items():
         assert plan.steps
@@ -149,12 +158,12 @@ def test_no_goal_has_a_part_in_what_is_learned_for_its_own_base_scene(drawn, set
     own = sets[scenes[at].id].candidates
     others = tuple(data.draw(st.lists(st.sampled_from(own), min_size=1, max_size=5)))
     changed = [*scenes[:at], scene(scenes[at].id, others, scenes[at].parents), *scenes[at + 1 :]]
-    kin = goal_blind.related(scenes)
+    kin = related(scenes)
     areas = {color: data.draw(st.sampled_from([0.0, 0.15, 0.5])) for color in COLORS}
-    offered = [goal_blind.units(sets[one.id], setting, areas) for one in scenes]
+    offered = [units(sets[one.id], setting, areas) for one in scenes]
     goals = [[Goal(one, sets[one.id], setting) for one in known] for known in (scenes, changed)]
-    for key in (*goal_blind.KEYS, *goal_blind.AREA_KEYS):
-        before, after = (goal_blind.chances(offered, known, kin, key) for known in goals)
+    for key in (*KEYS, *AREA_KEYS):
+        before, after = (chances(offered, known, kin, key) for known in goals)
         for place in kin[at]:
             np.testing.assert_array_equal(before[place], after[place])
 
@@ -171,12 +180,12 @@ def test_a_planted_tell_is_found(setting, is_drawn):
         needed = [one for one in offered if one.color == color] or offered[:1]
         scenes.append(scene(f"s{number}", tuple(needed)))
         sets[f"s{number}"] = CandidateSet(tuple(offered))
-    areas = {one.id: goal_blind.color_areas(one, "oblique") for one in scenes}
+    areas = {one.id: color_areas(one, "oblique") for one in scenes}
     assert all(areas[one.id] == {one.blocks[0].color: 1.0} for one in scenes)
     every = {name: Plan(tuple(range(1, 9))) for name in sets}
-    evenly = goal_blind.goal_blind_plans(scenes, sets, setting, [lambda _: None])
-    learned = goal_blind.goal_blind_plans(scenes, sets, setting)
-    seen = goal_blind.goal_blind_plans(scenes, sets, setting, goal_blind.AREA_KEYS, areas=areas)
+    evenly = goal_blind_plans(scenes, sets, setting, [lambda _: None])
+    learned = goal_blind_plans(scenes, sets, setting)
+    seen = goal_blind_plans(scenes, sets, setting, AREA_KEYS, areas=areas)
     found = {True: seen, False: learned}[is_drawn]
     others = [every, evenly, learned] if is_drawn else [every, evenly]
     assert plans_f1(scenes, sets, found, setting) > 0.8
@@ -196,13 +205,15 @@ PLACED = st.tuples(st.integers(0, N - 1), st.tuples(CENTIMETERS, CENTIMETERS, CE
 @given(st.lists(PLACED, min_size=1, max_size=99), st.integers(0, N))
 def test_plans_steps_and_places_are_read_as_they_were_picked(placed, step):
     subject, steps = PlanSubject(TASK.scene, TASK.candidates), tuple(n + 1 for n, _ in placed)
-    reply = pick_plan(subject).reply([Pick(number) for number, _ in placed])
+    reply = FullPlanning.by_hand(subject).reply([Pick(number) for number, _ in placed])
     assert parse_plan(reply, N).plan.steps == steps
     assert parse_plan(reply, N, "official").plan.steps == steps
-    reply = pick_poses(subject).reply([Pick(*one) for one in placed])
+    reply = PosePlanning.by_hand(subject).reply([Pick(*one) for one in placed])
     read = parse_poses(reply, N).steps
     assert [(one.candidate - 1, one.center_cm) for one in read] == placed
-    parsed = parse_move(pick_step(StepSubject(TASK.scene, TASK.candidates)).reply([Pick(step)]))
+    parsed = parse_move(
+        StepPlanning.by_hand(StepSubject(TASK.scene, TASK.candidates)).reply([Pick(step)])
+    )
     assert parsed.is_done if step == N else parsed.move == step + 1
 
 
@@ -211,7 +222,7 @@ def test_an_answer_is_read_as_it_was_picked(order, options, is_ordering):
     subtask = "OR" if is_ordering else "SH"
     question = Question("q", subtask, TASK.scene, "Which?", options, (0,))
     picks = order if is_ordering else order[:1]
-    reply = pick_answer(ChoiceSubject(question, {}.__getitem__)).reply(list(map(Pick, picks)))
+    reply = Vqa.by_hand(ChoiceSubject(question, {}.__getitem__)).reply(list(map(Pick, picks)))
     letters = "".join(LETTERS[pick] for pick in picks)
     assert parse_answer(reply, options, is_ordering).letters == letters
 
@@ -221,7 +232,7 @@ NOT_NUMBERS = ((), (1, 2), (1, 2, 3, 0, 0, 0), (1, -1000.5, 3), (0.125, 2, 3), (
 
 @pytest.mark.parametrize("numbers", [*NOT_NUMBERS, (1, 2, float("nan")), (1, 2, float("inf"))])
 def test_numbers_that_are_lacking_or_not_allowed_are_refused(numbers):
-    picking = pick_poses(PlanSubject(TASK.scene, TASK.candidates))
+    picking = PosePlanning.by_hand(PlanSubject(TASK.scene, TASK.candidates))
     with pytest.raises(ValueError, match="make no answer"):
         picking.reply([Pick(0, numbers)])
 
@@ -229,7 +240,7 @@ def test_numbers_that_are_lacking_or_not_allowed_are_refused(numbers):
 @settings(max_examples=50)
 @given(st.lists(st.integers(-2, 6), max_size=5), st.booleans())
 def test_picks_that_make_no_answer_are_refused(picks, repeats):
-    choices = pick_plan(PlanSubject(TASK.scene, TASK.candidates)).choices[:4]
+    choices = FullPlanning.by_hand(PlanSubject(TASK.scene, TASK.candidates)).choices[:4]
     joined = lambda picks: "-".join(str(pick.place) for pick in picks)  # noqa: E731
     picking = Picking(choices, 1, 3, repeats, "step", joined)
     is_right = 1 <= len(picks) <= 3 and all(0 <= pick < 4 for pick in picks)

@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 import phyblock
 from phyblock.domain.scene import AssemblyTask, Block, Candidate, CandidateSet, Plan, Scene
 from phyblock.tracks.base import presented
-from phyblock.tracks.full_planning import pose_counts
-from phyblock.tracks.goal_blind import goal_blind_plans
+from phyblock.tracks.full_planning import goal_blind_plans, pose_counts
 from phyblock.types import MATCHERS
 from tests.tracks.conftest import track_of
 from tests.workspace import plan_text

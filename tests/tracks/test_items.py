@@ -12,8 +12,15 @@ from hypothesis import strategies as st
 from phyblock.domain.scene import AOVGraph, Candidate, CandidateSet
 from phyblock.errors import DataError
 from phyblock.records.record import Reply
-from phyblock.tracks.base import fair_order, in_order, presented, spread
-from phyblock.tracks.difficulty import MEASURES, distractor_distance, log_orders
+from phyblock.tracks.base import (
+    DIFFICULTY,
+    distractor_distance,
+    fair_order,
+    in_order,
+    log_orders,
+    presented,
+    spread,
+)
 from tests.shipped import TASKS
 from tests.tracks.conftest import track_of
 from tests.workspace import call
@@ -124,7 +131,7 @@ def test_there_are_as_many_orders_as_is_said_or_more(graph):
 
 def test_numbers_are_within_their_bounds_and_tell_scenes_apart():
     for task in TASKS[::9]:
-        numbers = {name: measure(task) for name, measure in MEASURES.items()}
+        numbers = {name: measure(task) for name, measure in DIFFICULTY.items()}
         assert 0 < numbers["blind"] < 1
         assert 1 <= numbers["distractor"] <= 3
         assert 1 <= numbers["depth"] <= numbers["blocks"] == len(task.scene)

@@ -21,7 +21,7 @@ from phyblock.sim.dynamics import execute
 from phyblock.sim.engine import Pose
 from phyblock.sim.geometry import center_cm, put
 from phyblock.tracks import pose_planning as pose_track
-from phyblock.tracks.pose_planning import POSE_RULES, written
+from phyblock.tracks.pose_planning import PosePlanning, written
 from phyblock.types import STEP_ENDS
 from tests.shipped import TASKS
 from tests.sim.structures import block_types, eulers
@@ -61,7 +61,7 @@ def test_true_poses_in_a_random_valid_order_are_right_and_stand():
     for seed, item in enumerate(BUILT_IN):
         shown = track.shown(item, seed)
         subject = track.subject_of(shown)
-        text = POSE_RULES["oracle"](subject, np.random.default_rng(seed))
+        text = PosePlanning.baselines["oracle"](subject, np.random.default_rng(seed))
         fields, n = track.judge(shown, text).fields, len(item.scene)
         pose = fields["pose"]
         assert pose["right"] == {"absolute": [n] * 4, "aligned": [n] * 4}
@@ -111,7 +111,7 @@ def test_a_reply_is_read_scored_and_carried_out(task, text, right, ends, errors,
 @pytest.mark.parametrize("baseline", ["oracle-noise-1cm", "stack", "oracle-2d"])
 def test_where_blocks_came_to_lie_follows_from_what_each_step_moved(baseline):
     item, track = BUILT_IN[0], poses()
-    text = POSE_RULES[baseline](track.subject_of(item), np.random.default_rng(1))
+    text = PosePlanning.baselines[baseline](track.subject_of(item), np.random.default_rng(1))
     found = track.judge(item, text)
     blocks = [put(step, item.candidates) for step in parse_poses(text, 16).steps]
     fields, worlds = begun("s", track, "m", item, 0, None), execute(blocks).worlds

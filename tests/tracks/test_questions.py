@@ -16,9 +16,9 @@ from phyblock.sim.pictures import PictureStyle
 from phyblock.sim.question_pictures import question_key
 from phyblock.tracks import questions
 from phyblock.tracks.questions import (
-    CHOICE_RULES,
     AskedQuestion,
     ChoiceSubject,
+    Vqa,
     question_drawings,
     select_questions,
 )
@@ -102,7 +102,7 @@ def test_random_answers_are_spread_over_all_that_can_be_given_and_read(question_
         assert (bad.is_read, bad.fields["answer"]["given"]) == (False, None)
         assert track.judge(item, f"Answer: {right}").fields["answer"]["correct"]
         subject = ChoiceSubject(item.question, lambda: (0,))
-        found[item.question.subtask] = {CHOICE_RULES["random"](subject, rng) for _ in range(300)}
+        found[item.question.subtask] = {Vqa.baselines["random"](subject, rng) for _ in range(300)}
     sizes = {len(texts) for name, texts in found.items() if name != "OR"}
     assert (sizes, len(found["OR"])) == ({4}, 24)
 

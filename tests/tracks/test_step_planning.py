@@ -18,7 +18,7 @@ from phyblock.parsing.move import MOVE_PROBLEMS
 from phyblock.records.record import Reply
 from phyblock.scoring.steps import MOVE_OUTCOMES
 from phyblock.tracks.pictures import Workshop
-from phyblock.tracks.step_planning import ENDINGS, STEP_RULES, Feedback, PastStep
+from phyblock.tracks.step_planning import ENDINGS, Feedback, PastStep, StepPlanning
 from phyblock.types import SETTINGS
 from tests.parsing.test_replies import ROWS
 from tests.shipped import TASKS, official_tasks
@@ -53,7 +53,7 @@ def scripted(*texts):
 
 
 def baseline(name):
-    rule = STEP_RULES[name]
+    rule = StepPlanning.baselines[name]
 
     def ask(request):
         seed = zlib.crc32(f"{name} {request.key} {request.seed}".encode())

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from phyblock.config.suite import load_suite
 from phyblock.errors import SpecError
 from phyblock.models.request import HaltedError, Image, Message, Request
-from phyblock.tracks.picking import Choice, Pick, Picking
+from phyblock.tracks.base import Choice, Pick, Picking
 from phyblock.web.server import LARGEST_BODY_BYTES, Server
 from phyblock.web.session import NotNowError, Person, PlaySession, plan_session
 from tests.workspace import SCENES, in_a_loop, until
