@@ -169,7 +169,6 @@ def read_official_questions(folder: Path, scenes: Dataset) -> QuestionSet:
     if not sets:
         allowed = "question files such as SH.json, one a subtask"
         raise DataError(Problem(str(folder), "holds no question files", allowed=allowed))
-    adapter: TypeAdapter[tuple[_Question, ...]] = TypeAdapter(tuple[_Question, ...])
     names = {name: s for s in SUBTASKS for name in (s.lower(), SUBTASK_NAMES[s].replace(" ", ""))}
     items = []
     for path in sets:
@@ -177,7 +176,8 @@ def read_official_questions(folder: Path, scenes: Dataset) -> QuestionSet:
         if subtask is None:
             allowed = ", ".join(SUBTASKS)
             raise DataError(Problem(str(path), "names no subtask", "the file", path.stem, allowed))
-        for n, line in enumerate(decode(adapter, read_data(path), str(path))):
+        lines = decode(TypeAdapter(tuple[_Question, ...]), read_data(path), str(path))
+        for n, line in enumerate(lines):
             name = line.id or f"{subtask.lower()}-{n + 1:03d}"
             items.append((f"{path}[{n}]", (name, subtask, line)))
 
