@@ -42,20 +42,20 @@ def open_pool(processes: int) -> ProcessPoolExecutor:
 
 
 def _begin(plugins: list[str]) -> None:
-    """Prepare a worker process."""
+    """Prepare a worker process, which ends with its parent."""
+    parent = parent_process()
+    assert parent is not None
+
+    def end_with_parent() -> None:
+        parent.join()
+        os._exit(0)
+
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    threading.Thread(target=end_with_parent, daemon=True).start()
     # Threads of BLAS in every process would wait for one another on small matrices.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     for plugin in plugins:
         importlib.import_module(plugin)
-
-
-def _end_with_parent() -> None:
-    parent = parent_process()
-    assert parent is not None
-    parent.join()
-    os._exit(0)
 
 
 @dataclass
@@ -186,12 +186,6 @@ def _each(
     return answers
 
 
-def _done_here(*job: Any) -> Future[Any]:
-    future: Future[Any] = Future()
-    future.set_result(_each(*job))
-    return future
-
-
 @contextlib.contextmanager
 def open_workers(
     jobs: int = 1,
@@ -208,7 +202,17 @@ def open_workers(
     size = max(size, _BATCH if ray_address or shards else 1)
     ahead = _SHARED_AHEAD if shards else _AHEAD
     if ray_address is not None:
-        ray = _connected_ray(jobs, ray_address)
+        try:
+            ray = importlib.import_module("ray")
+            options = {"num_cpus": jobs} if ray_address == "local" else {"address": ray_address}
+            ray.init(log_to_driver=False, **options)
+        except ModuleNotFoundError as error:
+            hint = "pip install 'phyblock[ray]'"
+            raise InputError(Problem("--ray", "Ray is not installed", hint=hint)) from error
+        except (ConnectionError, ValueError, RuntimeError) as error:
+            allowed = "local, auto, or the HOST:PORT of a running cluster"
+            problem = Problem("--ray", "no such cluster", "", ray_address, allowed)
+            raise InputError(problem) from error
         try:
             # A batch whose worker dies is computed again, with the same result: it is pure.
             remote = ray.remote(max_retries=_RAY_RETRIES)(_each).remote
@@ -217,7 +221,13 @@ def open_workers(
         finally:
             ray.shutdown()
     elif jobs == 1:
-        yield Workers(_done_here, ahead if shards else 0, size, shards, is_here=True)
+
+        def done_here(*job: Any) -> Future[Any]:
+            future: Future[Any] = Future()
+            future.set_result(_each(*job))
+            return future
+
+        yield Workers(done_here, ahead if shards else 0, size, shards, is_here=True)
     else:
         with open_pool(jobs) as pool:
             try:
@@ -229,17 +239,3 @@ def open_workers(
                 for process in list(pool._processes.values()):
                     process.kill()
                 raise
-
-
-def _connected_ray(jobs: int, address: str) -> Any:
-    try:
-        ray = importlib.import_module("ray")
-        options = {"num_cpus": jobs} if address == "local" else {"address": address}
-        ray.init(log_to_driver=False, **options)
-    except ModuleNotFoundError as error:
-        hint = "pip install 'phyblock[ray]'"
-        raise InputError(Problem("--ray", "Ray is not installed", hint=hint)) from error
-    except (ConnectionError, ValueError, RuntimeError) as error:
-        allowed = "local, auto, or the HOST:PORT of a running cluster"
-        raise InputError(Problem("--ray", "no such cluster", "", address, allowed)) from error
-    return ray
