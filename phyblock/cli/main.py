@@ -135,7 +135,13 @@ def main() -> None:
         if "unexpected extra argument" in error.format_message():
             click.echo(f"Hint: {QUOTE_HINT}", err=True)
         elif isinstance(error, click.NoSuchOption):
-            click.echo(f"Hint: {_set_hint(error.option_name)}", err=True)
+            from phyblock.config.suite import suite_model
+
+            name = error.option_name.lstrip("-").replace("-", "_")
+            field = suite_model().model_fields.get(name)
+            form = f"{name}=VALUE" if field else "KEY=VALUE"
+            form = f"'{name}=[...]'" if field and isinstance(field.default, tuple) else form
+            click.echo(f"Hint: fields of the suite are set with --set {form}", err=True)
         sys.exit(2)
     except click.Abort:
         click.echo("Interrupted.", err=True)
@@ -156,16 +162,6 @@ def main() -> None:
         show_problems(StoreError(Problem(where, f"cannot be used: {reason_of(error)}")))
         sys.exit(2)
     sys.exit(code if isinstance(code, int) else 0)
-
-
-def _set_hint(option: str) -> str:
-    """Return a hint on --set for an unknown option that is a field of a suite."""
-    from phyblock.config.suite import suite_model
-
-    name = option.lstrip("-").replace("-", "_")
-    known = suite_model().model_fields.get(name)
-    form = f"'{name}=[...]'" if known and isinstance(known.default, tuple) else f"{name}=VALUE"
-    return f"fields of the suite are set with --set {form if known else 'KEY=VALUE'}"
 
 
 def _drop_output() -> None:

@@ -108,12 +108,18 @@ def show(run: Path, sample: str, data: Path | None) -> None:
 
     SAMPLE is an id as in records.jsonl (TRACK/MODEL/ITEM/sSEED), or any unique part of it.
     """
-    from phyblock.records.files import read_manifest
+    from phyblock.records.files import RECORDS, newest_starts, read_manifest, run_records
     from phyblock.registry import known_track
     from phyblock.run.rescore import recorded_dataset
     from phyblock.tracks.base import as_recorded
 
-    record = _find(run, sample)
+    lines = run_records(run)
+    starts = newest_starts(lines)
+    matching = [sample] if sample in starts else [name for name in starts if sample in name]
+    if len(matching) != 1:
+        message, allowed = f"{len(matching):,} samples fit", some_of(matching or list(starts))
+        raise StoreError(Problem(str(run / RECORDS), message, "sample", sample, allowed))
+    record = next(iter(lines.at([starts[matching[0]]])))
     console = make_console()
     console.print(record.sample, style="bold")
     facts = [f"scene {record.scene}", f"level {', '.join(map(str, record.levels))}"]
@@ -160,19 +166,6 @@ def show(run: Path, sample: str, data: Path | None) -> None:
         console.print(one_line(f"{n}. {step}: {verdict}"), style="red" if why else "green")
     end = f"{record.n_blocks - course.missing} of {counted(record.n_blocks, 'block')} placed"
     console.print(end + (f"; ended: {heading(course.ending)}" if course.ending else ""))
-
-
-def _find(run: Path, sample: str) -> Record:
-    """Return the newest record of `sample`. Raises StoreError unless exactly one matches."""
-    from phyblock.records.files import RECORDS, newest_starts, run_records
-
-    lines = run_records(run)
-    starts = newest_starts(lines)
-    matching = [sample] if sample in starts else [name for name in starts if sample in name]
-    if len(matching) == 1:
-        return next(iter(lines.at([starts[matching[0]]])))
-    message, allowed = f"{len(matching):,} samples fit", some_of(matching or list(starts))
-    raise StoreError(Problem(str(run / RECORDS), message, "sample", sample, allowed))
 
 
 def _print_prompt(console: Console, run: Path, record: Record) -> None:

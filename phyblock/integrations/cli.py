@@ -44,7 +44,7 @@ def export(
     hf: Parquet and a card, for `datasets.load_dataset`. csv: one row per sample. vlmevalkit: a TSV
     file. lmms-eval: a folder for --include_path.
     """
-    from phyblock.integrations import files, huggingface
+    from phyblock.integrations import files
     from phyblock.results.export import export_frame, write_csv
     from phyblock.results.load import load_run
 
@@ -55,14 +55,14 @@ def export(
     if run is not None:
         loaded, folder = load_run(run), out or run / "export" / form
         makers["csv"] = partial(write_csv, loaded, folder)
-        makers["hf"] = lambda: huggingface.write(folder, "records", export_frame(loaded))
+        makers["hf"] = lambda: files.write_parquet(folder, "records", export_frame(loaded))
     elif out is None:
         raise click.UsageError("--out is missing: the folder to write.")
     elif scenes:
-        makers["hf"] = partial(huggingface.write_scenes, out, data, limit)
+        makers["hf"] = partial(files.write_scenes, out, data, limit)
     elif questions is not None:
         asked = (out, questions, data, limit)
-        makers["hf"] = partial(huggingface.write_questions, *asked)
+        makers["hf"] = partial(files.write_questions, *asked)
         makers["vlmevalkit"] = partial(files.write_vlmevalkit, *asked)
     else:
         makers["lmms-eval"] = partial(files.write_lmms_eval, out, limit)

@@ -25,7 +25,6 @@ from phyblock.models.request import Image, Request, wire_params
 from phyblock.records.record import Reply, Usage
 from phyblock.types import ImageDetail
 
-FREE = Tariff(input=0.0, output=0.0)
 _MAP_FILE = "model_prices_and_context_window_backup.json"
 _MAP_KEYS = {
     "input": "input_cost_per_token",
@@ -55,7 +54,7 @@ def tariff_of(config: ModelConfig) -> Tariff | None:
     Batches without a price cost half at the provider's own address, and the full price elsewhere.
     """
     if config.kind != "litellm":
-        return FREE
+        return Tariff(input=0.0, output=0.0)
     tariff = config.price or _mapped_tariff(config)
     host, base = _HALVING_HOSTS.get(config.provider), config.api_base
     is_halved = host is not None and (host_of(base) == host if base else not config.addresses)
@@ -107,7 +106,8 @@ def is_billed(config: ModelConfig) -> bool:
 
 
 @functools.cache
-def _map_entries() -> dict[str, dict[str, Any]]:
+def map_entries() -> dict[str, dict[str, Any]]:
+    """Return litellm's map of models by id; empty without the library's file."""
     spec = importlib.util.find_spec("litellm")
     path = Path(spec.origin).with_name(_MAP_FILE) if spec and spec.origin else None
     if path is None or not path.is_file():
@@ -120,18 +120,12 @@ def map_entry(config: ModelConfig) -> dict[str, Any]:
     """Return the entry of a model in litellm's map, by full id, or by bare name if the provider is
     the same; empty if there is none.
     """
-    entries = _map_entries()
+    entries = map_entries()
     if config.id in entries:
         return entries[config.id]
     entry = entries.get(config.provider_model, {})
     owner = str(entry.get("litellm_provider", ""))
     return entry if config.provider and owner.startswith(config.provider) else {}
-
-
-def mapped_providers() -> frozenset[str]:
-    """Return the providers of the map's models."""
-    named = (str(entry.get("litellm_provider", "")) for entry in _map_entries().values())
-    return frozenset(filter(None, named))
 
 
 def _mapped_tariff(config: ModelConfig) -> Tariff | None:

@@ -32,7 +32,7 @@ from phyblock.models.client import (
     read_json,
     read_raw_reply,
 )
-from phyblock.models.costs import mapped_providers
+from phyblock.models.costs import map_entries
 from phyblock.models.request import Request, wire_messages, wire_params
 from phyblock.records.record import Reply, Usage
 
@@ -50,6 +50,8 @@ _WHILE_IMPORTED = {
     "LITELLM_MODE": "PRODUCTION",  # else the import reads keys from any .env file above
     "MAX_BASE64_LENGTH_FOR_LOGGING": "0",  # else a regex goes over every picture for its log
 }
+_OURS = ("accept-encoding", "connection", "content-length", "host", "transfer-encoding")
+"""Headers that phyblock's HTTP client sets."""
 _OWN_CLIENTS = (
     "aiohttp_openai", "amazon_nova", "cloudflare", "cohere", "cohere_chat", "maritalk", "nlp_cloud",
     "oobabooga", "petals", "predibase", "replicate",
@@ -111,34 +113,31 @@ class LitellmClient(Client):
         except TimeoutError:
             raise RetryableError("no answer in time", sent="maybe") from None
         except Exception as error:
-            return self._after(error, exchange)
+            if exchange.failure is not None:
+                raise exchange.failure from None
+            answer = exchange.answer
+            said = f"{type(error).__name__}: {str(error).partition('Traceback (most recent')[0]}"
+            if answer is None and config.provider in _OWN_CLIENTS:
+                status = getattr(error, "status_code", None) or 500
+                raise error_of(Answer(status, {}, said.encode())) from None
+            if answer is None:
+                # A package, a credential or a setting is missing: every request would fail.
+                raise UnavailableError(said, sent="no") from None
+            if not answer.is_success:
+                failure = error_of(answer)
+                if isinstance(error, litellm.ContentPolicyViolationError):
+                    failure = RefusedError(str(failure), status=answer.status)
+                raise failure from None
+            # litellm could not read what phyblock may.
+            with contextlib.suppress(DataError):
+                reply = read_raw_reply(read_json(answer), "")
+                if reply.text:
+                    return reply.model_copy(update={"usage": Usage()})
+            raise malformed(answer.status, said) from None
         finally:
             _CURRENT.reset(token)
         status = exchange.answer.status if exchange.answer else 200
         return read_completion(response.model_dump(), status)
-
-    def _after(self, error: Exception, exchange: _Exchange) -> Reply:
-        """Return the reply on the wire of a failed call, or raise its error."""
-        if exchange.failure is not None:
-            raise exchange.failure from None
-        answer = exchange.answer
-        said = f"{type(error).__name__}: {str(error).partition('Traceback (most recent')[0]}"
-        if answer is None and self.config.provider in _OWN_CLIENTS:
-            status = getattr(error, "status_code", None) or 500
-            raise error_of(Answer(status, {}, said.encode())) from None
-        if answer is None:
-            # A package, a credential or a setting is missing: every request would fail.
-            raise UnavailableError(said, sent="no") from None
-        if not answer.is_success:
-            failure = error_of(answer)
-            if isinstance(error, _litellm().ContentPolicyViolationError):
-                failure = RefusedError(str(failure), status=answer.status)
-            raise failure from None
-        with contextlib.suppress(DataError):
-            reply = read_raw_reply(read_json(answer), "")
-            if reply.text:
-                return reply.model_copy(update={"usage": Usage()})
-        raise malformed(answer.status, said) from None
 
 
 def _sender(config: ModelConfig) -> Any:
@@ -148,14 +147,26 @@ def _sender(config: ModelConfig) -> Any:
     from litellm.llms.custom_httpx.http_handler import AsyncHTTPHandler
 
     class Wire(httpx.AsyncBaseTransport):
-        """Sends through the exchange of the task; every failure is a ReadError, after which
-        litellm does not retry.
+        """Sends each request once, and only to the model's server, through the exchange of the
+        task; every failure is a ReadError, after which litellm does not retry.
         """
 
         async def handle_async_request(self, request: httpx.Request) -> httpx.Response:
-            exchange = _CURRENT.get()
+            exchange, url, method = _CURRENT.get(), str(request.url), request.method
             try:
-                answer = await _send(exchange, config, request)
+                server = urlsplit(config.api_base or url)
+                if urlsplit(url)[:2] != server[:2]:
+                    host = urlsplit(url).hostname
+                    why = f"nothing is sent to {host}, which is not the model's server"
+                    raise UnavailableError(why, sent="no")
+                if method == "POST" and url in exchange.posted:
+                    why = "litellm would send the request twice"
+                    raise exchange.failure or UnavailableError(why)
+                exchange.posted.add(url)
+                sent = {k: v for k, v in request.headers.items() if k not in _OURS}
+                answer = await exchange.http.send(url, await request.aread(), sent, method=method)
+                if answer.fault or answer.is_success:
+                    read_json(answer)
             except Exception as failure:
                 exchange.failure = failure
                 # Its message may contain what litellm must not log.
@@ -194,23 +205,6 @@ def _sender(config: ModelConfig) -> Any:
     return Sender()
 
 
-async def _send(exchange: _Exchange, config: ModelConfig, request: httpx.Request) -> Answer:
-    """Send litellm's request, once, and only to the model's server."""
-    url, method = str(request.url), request.method
-    if config.api_base is not None and urlsplit(url)[:2] != urlsplit(config.api_base)[:2]:
-        why = f"nothing is sent to {urlsplit(url).hostname}, which is not the model's server"
-        raise UnavailableError(why, sent="no")
-    if method == "POST" and url in exchange.posted:
-        raise exchange.failure or UnavailableError("litellm would send the request twice")
-    exchange.posted.add(url)
-    ours = ("accept-encoding", "connection", "content-length", "host", "transfer-encoding")
-    headers = {name: value for name, value in request.headers.items() if name not in ours}
-    answer = await exchange.http.send(url, await request.aread(), headers, method=method)
-    if answer.fault or answer.is_success:
-        read_json(answer)
-    return answer
-
-
 @cache
 def _litellm() -> Any:
     """Import litellm, and restore the environment afterwards."""
@@ -240,7 +234,8 @@ def be_quiet() -> None:
 
 def known_providers(config: ModelConfig) -> frozenset[str]:
     """Return known providers; litellm is imported only if the model has none of the usual ones."""
-    usual = frozenset((*DIRECT_PROVIDERS, *KEYLESS, *mapped_providers()))
+    mapped = (str(entry.get("litellm_provider", "")) for entry in map_entries().values())
+    usual = frozenset((*DIRECT_PROVIDERS, *KEYLESS, *filter(None, mapped)))
     if config.provider in usual:
         return usual
     return usual | {str(getattr(one, "value", one)) for one in _litellm().provider_list}

@@ -53,26 +53,35 @@ def open_replay(config: ModelConfig) -> LocalModel:
     A folder with `records.jsonl` is a run of phyblock, any other a folder of raw replies. Raises
     DataError if there is no such folder, or no JSON in it.
     """
-    folder = config.recording
+    folder, name = config.recording, config.name
     if folder is None or not folder.is_dir():
-        where, found = f"model {config.name}", str(folder)
+        where, found = f"model {name}", str(folder)
         raise DataError(Problem(where, "recordings not found", "replay", found, "a folder"))
-    if (folder / RECORDS).is_file():
-        known = _read_records(folder, config.name)
+    if not (folder / RECORDS).is_file():
+        if not any(folder.glob("*.json")):
+            allowed = f"a file a scene such as 000.json, or {RECORDS}"
+            raise DataError(Problem(str(folder), "holds no recorded replies", allowed=allowed))
+        return LocalModel(name, partial(_read_file, folder))
+    # By model, then by track, key and seed.
+    found_in: dict[str, dict[tuple[str, str, int], Record]] = {}
+    for _, record in RecordLines(folder):
+        if not record.variant:
+            of_model = found_in.setdefault(record.model, {})
+            of_model[record.track, record.key, record.seed] = record
+    if name not in found_in and len(found_in) != 1:
+        where, allowed = str(folder / RECORDS), ", ".join(found_in)
+        raise DataError(Problem(where, "has no records of this model", "model", name, allowed))
+    known = found_in.get(name) or next(iter(found_in.values()))
 
-        def recorded(request: Request) -> Reply | None:
-            record = known.get((request.track, request.key, request.seed))
-            error = None if record is None else record.error
-            if error is not None and error.kind in ("sample", "refused"):
-                cls = RefusedError if error.kind == "refused" else SampleError
-                raise cls(error.message, status=error.status)
-            return None if record is None else record.reply
+    def recorded(request: Request) -> Reply | None:
+        record = known.get((request.track, request.key, request.seed))
+        error = None if record is None else record.error
+        if error is not None and error.kind in ("sample", "refused"):
+            cls = RefusedError if error.kind == "refused" else SampleError
+            raise cls(error.message, status=error.status)
+        return None if record is None else record.reply
 
-        return LocalModel(config.name, recorded)
-    if not any(folder.glob("*.json")):
-        allowed = f"a file a scene such as 000.json, or {RECORDS}"
-        raise DataError(Problem(str(folder), "holds no recorded replies", allowed=allowed))
-    return LocalModel(config.name, partial(_read_file, folder))
+    return LocalModel(name, recorded)
 
 
 def open_baseline(config: ModelConfig) -> LocalModel:
@@ -110,19 +119,3 @@ def _read_file(folder: Path, request: Request) -> Reply | None:
         where = f"{path}:{getattr(error, 'lineno', 1)}:{getattr(error, 'colno', 1)}"
         raise DataError(Problem(where, f"is not JSON: {error}")) from error
     return read_raw_reply(raw, str(path))
-
-
-_Records = dict[tuple[str, str, int], Record]
-
-
-def _read_records(folder: Path, model: str) -> _Records:
-    """Read the records of one model, or of the only one, by track, key and seed."""
-    found: dict[str, _Records] = {}
-    for _, record in RecordLines(folder):
-        if not record.variant:
-            found.setdefault(record.model, {})[record.track, record.key, record.seed] = record
-    if model in found or len(found) == 1:
-        return found.get(model) or next(iter(found.values()))
-    where = str(folder / RECORDS)
-    message = "has no records of this model"
-    raise DataError(Problem(where, message, "model", model, ", ".join(found)))

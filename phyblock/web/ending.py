@@ -23,7 +23,6 @@ from phyblock.text import counted, one_line
 from phyblock.tracks.base import as_recorded, kind_of
 from phyblock.web.pack import card_png
 
-CARD = "card.png"
 _BUILT = re.compile(r"built/(\d{1,9})\.png")
 _SIZE_PX, _GAP_PX = 320, 8
 
@@ -58,7 +57,7 @@ class Ending:
         """Return the card, or the goal beside the built structure; None for other names."""
         if (found := _BUILT.fullmatch(name)) and int(found[1]) in self._built:
             return to_png(self._pair(int(found[1])))
-        if name != CARD or not self.shown["tracks"]:
+        if name != "card.png" or not self.shown["tracks"]:
             return None
         first = self.shown["tracks"][0]
         said = " · ".join(f"{one} {number(value)}" for one, value in first["line"])
@@ -79,8 +78,23 @@ class Ending:
 
     def _track(self, track: str, records: Sequence[Record]) -> dict[str, Any]:
         """Return a track: measure, all means, rows, and the `line` of person, floor, best model."""
-        kind, measure = kind_of(track), comparable(self._run, track).measure
-        own, others = self._values(track)
+        kind, what = kind_of(track), comparable(self._run, track)
+        measure, part = what.measure, what.parts[-1]
+        # The value of each item, by name.
+        others: dict[str, dict[str, float]] = {}
+        for other in self._runs:
+            if track not in other.design.suite.tracks:
+                continue
+            try:
+                check_pair(other, self._run, [part.cell], track, measure)
+            except SpecError as error:
+                self._notes.append(f"Left out, as it cannot be compared: {one_line(str(error))}")
+                continue
+            for model, values in what.values(other, part, self._run.design):
+                by_item = values.groupby(level="item").mean()
+                found = {str(item): float(mean) for item, mean in by_item.items()}
+                others.setdefault(model, found)
+        own = others.pop(self._person, {})
         rows = [
             {
                 "key": record.item,
@@ -113,23 +127,6 @@ class Ending:
             "means": means,
             "rows": rows,
         }
-
-    def _values(self, track: str) -> tuple[dict[str, float], dict[str, dict[str, float]]]:
-        """Return the person's value of each item, and those of all others by name."""
-        what = comparable(self._run, track)
-        part, found = what.parts[-1], dict[str, dict[str, float]]()
-        for other in self._runs:
-            if track not in other.design.suite.tracks:
-                continue
-            try:
-                check_pair(other, self._run, [part.cell], track, what.measure)
-            except SpecError as error:
-                self._notes.append(f"Left out, as it cannot be compared: {one_line(str(error))}")
-                continue
-            for model, values in what.values(other, part, self._run.design):
-                means = values.groupby(level="item").mean()
-                found.setdefault(model, {str(item): float(mean) for item, mean in means.items()})
-        return found.pop(self._person, {}), found
 
 
 def went(record: Record, matcher: str) -> dict[str, Any]:

@@ -8,7 +8,6 @@ from typing import Any
 
 from phyblock.files import OutFolder, digest_of_file
 from phyblock.records.files import MANIFEST, PROMPTS, RECORDS, STOPPED, read_stopped
-from phyblock.results.load import Run
 from phyblock.results.tables import TablesWritten, coverage_frame, table_files
 from phyblock.results.text import REPORT_FILE
 from phyblock.tracks.base import kind_of
@@ -27,32 +26,6 @@ _FOLDER = "report/"
 _PAGE = (REPORT_FILE, _FOLDER, PICTURES)
 """The page and the folders beside it in a run folder."""
 _FAILURES = 6
-
-
-def cautions(run: Run) -> tuple[str, ...]:
-    """Return warnings to read before any number, most important first; () for a complete run."""
-    table, stopped, sentences = coverage_frame(run), read_stopped(run.path), []
-    expected, recorded = int(table["expected"].sum()), int(table["recorded"].sum())
-    if recorded < expected:
-        sentences.append(
-            f"This run is not finished: {recorded:,} of {expected:,} samples have a record."
-        )
-    tracks = run.design.suite.tracks
-    sentences += [
-        f"{model}{f', {kind_of(track).title}' if len(tracks) > 1 else ''}: {said}."
-        for track in tracks
-        for model, said in shortfalls(run, track).items()
-    ]
-    if stopped.run:
-        sentences.append(f"The last session was stopped: {short(stopped.run)}.")
-    if run.is_cut:
-        sentences.append("The last line of records.jsonl was cut off and is ignored.")
-    limit, items = run.manifest.limit, run.design.items
-    if cut := [name for name in tracks if limit and items.get(name, 0) >= limit]:
-        asked = [(items[name], kind_of(name)) for name in cut]
-        counts = ", ".join(f"{n:,} {kind.item}s of {kind.title}" for n, kind in asked)
-        sentences.append(f"A limit was set: {counts} were asked about, not all of the suite.")
-    return tuple(sentences)
 
 
 def write_report(written: TablesWritten, data: Path | None = None) -> Path:
@@ -99,11 +72,32 @@ def report_files(folder: Path) -> dict[str, Path]:
 
 
 def _about(written: TablesWritten) -> dict[str, Any]:
-    """Return the content of a page on one run besides its numbers: facts, and all its tables."""
-    run = written.run
-    manifest, design, coverage = run.manifest, run.design, coverage_frame(run)
-    answered = int(coverage["recorded"].sum() - coverage[list(WITHOUT_REPLY)].sum().sum())
-    expected = int(coverage["expected"].sum())
+    """Return the content of a page on one run besides its numbers: facts, all its tables, and
+    `cautions`, warnings to read before any number, most important first.
+    """
+    run, manifest, design = written.run, written.run.manifest, written.run.design
+    coverage, stopped, cautions = coverage_frame(run), read_stopped(run.path), []
+    expected, recorded = int(coverage["expected"].sum()), int(coverage["recorded"].sum())
+    if recorded < expected:
+        said = f"{recorded:,} of {expected:,} samples have a record"
+        cautions.append(f"This run is not finished: {said}.")
+    tracks = design.suite.tracks
+    cautions += [
+        f"{model}{f', {kind_of(track).title}' if len(tracks) > 1 else ''}: {said}."
+        for track in tracks
+        for model, said in shortfalls(run, track).items()
+    ]
+    if stopped.run:
+        cautions.append(f"The last session was stopped: {short(stopped.run)}.")
+    if run.is_cut:
+        cautions.append("The last line of records.jsonl was cut off and is ignored.")
+    limit, items = manifest.limit, design.items
+    if cut := [name for name in tracks if limit and items.get(name, 0) >= limit]:
+        counts = ", ".join(
+            f"{items[name]:,} {kind_of(name).item}s of {kind_of(name).title}" for name in cut
+        )
+        cautions.append(f"A limit was set: {counts} were asked about, not all of the suite.")
+    answered = recorded - int(coverage[list(WITHOUT_REPLY)].sum().sum())
     facts = {
         "Data": manifest.dataset.name if manifest.dataset else "",
         "Scenes": f"{design.scenes:,}",
@@ -121,6 +115,6 @@ def _about(written: TablesWritten) -> dict[str, Any]:
         # The description of a limited suite is still about the whole suite.
         "about": f"The whole suite: {about}" if manifest.limit and about else about,
         "facts": [(name, text) for name, text in facts.items() if text],
-        "cautions": cautions(run),
+        "cautions": cautions,
         "tables": [table.plain() for table in written.tables.values()],
     }

@@ -11,8 +11,7 @@ import pytest
 from PIL import Image as PillowImage
 
 from phyblock.domain.question import LETTERS, is_picture_option
-from phyblock.integrations import huggingface
-from phyblock.integrations.files import write_vlmevalkit
+from phyblock.integrations import files
 from phyblock.results.export import export_frame, write_csv
 from phyblock.results.load import load_run
 from tests.web.factory import LEVELS, asked, manifest, record, score, write_run
@@ -56,7 +55,7 @@ def test_rows_hold_what_was_asked_answered_and_counted(folder):
 def test_csv_parquet_and_datasets_come_back_as_the_same_rows(folder, tmp_path):
     run = load_run(folder)
     frame, (csv,) = export_frame(run), write_csv(run, tmp_path)
-    parquet, _ = huggingface.write(tmp_path / "hf", "records", frame)
+    parquet, _ = files.write_parquet(tmp_path / "hf", "records", frame)
     from_csv, from_parquet = pd.read_csv(csv), pd.read_parquet(parquet)
     assert from_csv["sample"].tolist() == from_parquet["sample"].tolist()
     assert from_csv["tp_a"].fillna(-1).tolist() == from_parquet["tp_a"].fillna(-1).tolist()
@@ -77,7 +76,7 @@ def loaded(parquet, folder, split):
 
 def test_a_tsv_file_is_as_vlmevalkit_reads_it(question_set, towers, tmp_path):
     out, asked_of = tmp_path / "out", str(question_set.root)
-    (file,) = write_vlmevalkit(out, asked_of, str(towers.root), None, 128)
+    (file,) = files.write_vlmevalkit(out, asked_of, str(towers.root), None, 128)
     csv.field_size_limit(10**8)
     rows = csv_rows(file, delimiter="\t")
     asked = {task.key: task.question for task in question_set.tasks}
@@ -109,14 +108,14 @@ def test_a_tsv_file_is_as_vlmevalkit_reads_it(question_set, towers, tmp_path):
 
 def test_a_hugging_face_dataset_has_questions_scenes_and_pictures(question_set, towers, tmp_path):
     out, asked_of = tmp_path / "questions", str(question_set.root)
-    parquet, _ = huggingface.write_questions(out, asked_of, str(towers.root), None, 128)
+    parquet, _ = files.write_questions(out, asked_of, str(towers.root), None, 128)
     rows = loaded(parquet, tmp_path, "test")
     assert rows["id"][:] == [task.key for task in question_set.tasks]
     for row, task in zip(rows, question_set.tasks, strict=True):
         assert row["answer"] == task.question.answer_letters
         assert row["options"] == list(task.question.options)
         assert [image.size for image in row["images"]] == [(128, 128)] * len(row["labels"])
-    parquet, card = huggingface.write_scenes(tmp_path / "scenes", str(towers.root), None, 128)
+    parquet, card = files.write_scenes(tmp_path / "scenes", str(towers.root), None, 128)
     rows = loaded(parquet, tmp_path, "test")
     assert "configs:" in card.read_text("utf-8")
     assert [json.loads(one)["id"] for one in rows["scene"]] == rows["id"][:]
