@@ -123,6 +123,10 @@ def run(
     asks: dict[str, Any] = {"use_cache": not no_cache, "retry_failed": retry_failed}
     if dry_run:
         print_estimate(console, plan, estimate(plan, folder, **asks))
+        try:
+            check_models(plan.models)
+        except SpecError as error:
+            console.print(f"A run would not begin:\n{error}", style="yellow")
         return 0
     check_models(plan.models)
     has_limit = plan.suite.limits.max_cost_usd is not None

@@ -160,8 +160,9 @@ def read_manifest(folder: Path) -> Manifest:
     try:
         return _manifest(read_text(path, _LARGEST_BYTES), str(path))
     except (FileNotFoundError, NotADirectoryError) as error:
+        message = f"holds no {MANIFEST}" if folder.exists() else "is not there"
         allowed = "a folder that phyblock run wrote"
-        raise StoreError(Problem(str(folder), f"holds no {MANIFEST}", allowed=allowed)) from error
+        raise StoreError(Problem(str(folder), message, allowed=allowed)) from error
     except (OSError, ValueError) as error:
         message = f"cannot be read: {reason_of(error)}"
         raise StoreError(Problem(str(path), message, hint=_HINT)) from error

@@ -243,6 +243,7 @@ FOLDERS = (
     Bad("compare-none", command("compare", "out", "data"), ("holds no run.yaml",)),
     Bad("clear", command("cache", "--clear", "hosted_vlm/alpha"), ("mean hosted_vllm/alpha",)),
     Bad("no-run", command("report", "data"), ("data: holds no run.yaml",)),
+    Bad("nothing", command("report", "no"), ("no: is not there",)),
     Bad("stranger", file_in_the_way("run", "suite.yaml", "--out", ".", "--dry-run"),
         (".: is not empty and holds no run", "found: ", "--out")),
     Bad("orphans", after(lambda made: (made.out / "run.yaml").unlink(), *RUN),
