@@ -23,6 +23,7 @@ from importlib.metadata import version
 from itertools import zip_longest
 from pathlib import Path
 
+from phyblock.config.yaml import dump_yaml
 from phyblock.errors import DataError, InputError, Problem, SpecError, StoreError, reason_of
 from phyblock.files import (
     OutFolder,
@@ -45,7 +46,7 @@ from phyblock.records.record import Record
 from phyblock.results.load import design_of
 from phyblock.run.manifest import portable_manifest, without_paths
 from phyblock.run.rescore import judged_again, recorded_dataset, reopen_tracks
-from phyblock.run.store import manifest_text, record_lines
+from phyblock.run.store import record_lines
 from phyblock.tracks.base import simulating
 
 BUNDLE_FILE = "bundle.zip"
@@ -88,7 +89,7 @@ def bundle_run(folder: Path, out: Path | None = None) -> Path:
     """
     manifest = read_manifest(folder)
     records = record_lines(map(portable, read_records(folder, manifest)))
-    members = {MANIFEST: [manifest_text(portable_manifest(manifest))], RECORDS: records}
+    members = {MANIFEST: [dump_yaml(portable_manifest(manifest).fields())], RECORDS: records}
     # The temporary file has no name: a kill leaves nothing behind.
     with tempfile.TemporaryFile() as file:
         with zipfile.ZipFile(file, "w", allowZip64=False) as archive:
@@ -137,7 +138,7 @@ def opened_bundle(path: Path, data: Sequence[Path] = ()) -> Iterator[Verified]:
             made_by = unpack(path, folder)
             manifest = read_manifest(folder)
             here = _localized(folder, manifest, data)
-            (folder / MANIFEST).write_text(manifest_text(here), encoding="utf-8")
+            (folder / MANIFEST).write_text(dump_yaml(here.fields()), encoding="utf-8")
             judged, again = judged_again(folder)
             counted = ("items", "scenes", "scenes_by_level")
             differ = [name for name in counted if getattr(here, name) != getattr(judged, name)]

@@ -398,11 +398,6 @@ def load_models(path: Path) -> dict[str, ModelConfig]:
     return models
 
 
-def group_names(known: Mapping[str, ModelConfig]) -> tuple[str, ...]:
-    """Return the groups of models, in the order of the file."""
-    return tuple(dict.fromkeys(group for config in known.values() for group in config.groups))
-
-
 def with_members(names: Sequence[str], known: Mapping[str, ModelConfig]) -> tuple[str, ...]:
     """Return the names, with groups replaced by their members; unknown groups are kept."""
     members: dict[str, None] = {}
@@ -422,7 +417,8 @@ def resolve_models(
     in the list.
     """
     named = {**{name: ModelConfig(name=name) for name in baseline_names()}, **known}
-    allowed = [*named, *(GROUP + name for name in group_names(known))]
+    groups = dict.fromkeys(group for config in known.values() for group in config.groups)
+    allowed = [*named, *(GROUP + group for group in groups)]
     problems = []
     for index, name in enumerate(names):
         if name in allowed:

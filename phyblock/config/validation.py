@@ -226,8 +226,22 @@ def problems_of(
     problems: dict[tuple[FieldPath, str], Problem] = {}
     above: set[FieldPath] = set()
     for detail in islice(error.errors(include_url=False), _MOST):
-        path, value = _located(detail, data)
-        is_ours = detail["type"] == _FAULT
+        # The path in the data lacks pydantic's names of union members.
+        path: FieldPath = ()
+        kind, value, loc = detail["type"], data, detail["loc"]
+        if kind.startswith("union_tag"):
+            loc += (detail.get("ctx", {}).get("discriminator", "").strip("'"),)
+        for n, part in enumerate(loc, 1):
+            is_last = n == len(loc) and kind in ("missing", "union_tag_not_found")
+            may_lack = part != "[key]" and (kind == _FAULT or is_last)
+            if isinstance(value, Mapping) and (part in value or may_lack):
+                value = value.get(part)
+            elif isinstance(value, list) and isinstance(part, int) and part < len(value):
+                value = value[part]
+            else:
+                continue
+            path += (part,)
+        is_ours = kind == _FAULT
         one = Fault(**detail["ctx"]) if is_ours else _fault(detail, path, value, model)
         key = (path, one.message if is_ours else "")
         if first := problems.get(key):
@@ -240,24 +254,6 @@ def problems_of(
         problems[key] = Problem(where, one.message, dotted(path), found, one.allowed, one.hint)
         above.update(path[:end] for end in range(len(path)))
     return [one for (path, kind), one in problems.items() if kind or path not in above]
-
-
-def _located(detail: ErrorDetails, data: object) -> tuple[FieldPath, Any]:
-    """Return the path of an error in the data, without pydantic's names of union members."""
-    path: list[str | int] = []
-    kind, tag = detail["type"], detail.get("ctx", {}).get("discriminator", "").strip("'")
-    loc = (*detail["loc"], tag) if kind.startswith("union_tag") else detail["loc"]
-    for n, part in enumerate(loc, 1):
-        is_last = n == len(loc) and kind in ("missing", "union_tag_not_found")
-        may_lack = part != "[key]" and (kind == _FAULT or is_last)
-        if isinstance(data, Mapping) and (part in data or may_lack):
-            data = data.get(part)
-        elif isinstance(data, list) and isinstance(part, int) and part < len(data):
-            data = data[part]
-        else:
-            continue
-        path.append(part)
-    return tuple(path), data
 
 
 def _fault(detail: ErrorDetails, path: FieldPath, value: Any, model: type[BaseModel]) -> Fault:

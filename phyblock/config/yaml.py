@@ -260,28 +260,23 @@ class _Walker:
         if isinstance(node, yaml.MappingNode) and kind == "map":
             data: dict[str, Any] = {}
             for key_node, value_node in node.value:
-                name = self._key(key_node, path, data)
-                data[name] = self.build(value_node, key_node, (*path, name))
+                if not isinstance(key_node, yaml.ScalarNode):
+                    raise self._error(key_node, path, "has a key that is not plain text")
+                name = self._text(key_node, path)
+                here = (*path, name)
+                if key_node.tag == _TAG + "merge":
+                    hint = "repeat the keys, or name the whole mapping with *NAME"
+                    raise self._error(key_node, here, "is not supported", hint=hint)
+                if name in data:
+                    hint = f"the first is at {self.source.where(here, key=True)}"
+                    raise self._error(key_node, here, "is written twice", hint=hint)
+                data[name] = self.build(value_node, key_node, here)
             return data
         if isinstance(node, yaml.SequenceNode) and kind == "seq":
             return [self.build(item, item, (*path, n)) for n, item in enumerate(node.value)]
         if isinstance(node, yaml.ScalarNode):
             return self._scalar(node, kind, path)
         raise self._error(node, path, "has a tag that is not allowed", node.tag)
-
-    def _key(self, node: yaml.Node, path: FieldPath, data: dict[str, Any]) -> str:
-        """Return the next key of a mapping with this data."""
-        if not isinstance(node, yaml.ScalarNode):
-            raise self._error(node, path, "has a key that is not plain text")
-        key = self._text(node, path)
-        here = (*path, key)
-        if node.tag == _TAG + "merge":
-            hint = "repeat the keys, or name the whole mapping with *NAME"
-            raise self._error(node, here, "is not supported", hint=hint)
-        if key in data:
-            hint = f"the first is at {self.source.where(here, key=True)}"
-            raise self._error(node, here, "is written twice", hint=hint)
-        return key
 
     def _scalar(self, node: yaml.ScalarNode, kind: str, path: FieldPath) -> Any:
         text = self._text(node, path)

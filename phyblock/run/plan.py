@@ -195,7 +195,12 @@ def _conflicts(
             yield Problem(where, "is a recording, which cannot be varied", "vary", varied)
             continue
         if model.recording is not None:
-            for field, was in _recorded_as(model.recording).items():
+            # Raw replies were made as in the paper.
+            made = {"candidates.order": "file", "answer_format": "text"}
+            if (path := model.recording / MANIFEST).is_file():
+                recorded = suite_of(read_manifest(model.recording), str(path)).at(Variant())
+                made = {field: attrgetter(field)(recorded) for field in made}
+            for field, was in made.items():
                 if was != (now := attrgetter(field)(suite)):
                     message = f"is a recording that was made with {field}: {was}"
                     yield Problem(where, message, field, now, was)
@@ -213,15 +218,6 @@ def _conflicts(
                 yield Problem(where, message, "tracks", hint=f"remove {name} from tracks")
             if model.kind == "baseline" and model.name not in able:
                 yield Problem(where, f"has no rule for {name}", "models", allowed=", ".join(able))
-
-
-def _recorded_as(folder: Path) -> dict[str, str]:
-    """Return the suite fields that a recording was made with: the paper's for raw replies."""
-    made = {"candidates.order": "file", "answer_format": "text"}
-    if not (folder / MANIFEST).is_file():
-        return made
-    suite = suite_of(read_manifest(folder), str(folder / MANIFEST)).at(Variant())
-    return {field: attrgetter(field)(suite) for field in made}
 
 
 def _planned_models(
@@ -294,13 +290,17 @@ def check_models(models: Iterable[ModelConfig], source: YamlSource | None = None
             problems.append(Problem(where, message, f"{name}.replay", found, allowed, hint))
         if config.kind != "litellm":
             continue
-        if not config.is_direct and config.provider not in (providers := _providers(config)):
-            message, hint = "has an unknown provider", did_you_mean(config.provider, providers)
-            if config.addresses:
-                hint = f"a server that speaks OpenAI's chat protocol: hosted_vllm/{config.id}"
-            allowed = "provider/model, as litellm names them"
-            problems.append(Problem(where, message, f"{name}.id", config.id, allowed, hint))
-            continue
+        if not config.is_direct:
+            # litellm, slow to import, is imported only for the models it asks.
+            from phyblock.models.litellm_client import known_providers
+
+            if config.provider not in (providers := known_providers(config)):
+                message, hint = "has an unknown provider", did_you_mean(config.provider, providers)
+                if config.addresses:
+                    hint = f"a server that speaks OpenAI's chat protocol: hosted_vllm/{config.id}"
+                allowed = "provider/model, as litellm names them"
+                problems.append(Problem(where, message, f"{name}.id", config.id, allowed, hint))
+                continue
         status = api_key_status(config)
         if source is None and status.is_needed and not status.key:
             variables = " or ".join(status.variables)
@@ -311,20 +311,14 @@ def check_models(models: Iterable[ModelConfig], source: YamlSource | None = None
         raise SpecError(problems)
 
 
-def _providers(config: ModelConfig) -> frozenset[str]:
-    """Return the known providers. litellm, slow to import, is imported for the models it asks."""
-    from phyblock.models.litellm_client import known_providers
-
-    return known_providers(config)
-
-
 @dataclass
 class Estimate:
-    """The estimate of one model; dollars are None where no price is known.
+    """The estimate of one model.
 
     `done` samples have a record in the folder, `cached` ones a reply in the cache, `waiting` ones
     are in batches, `calls` are still to be made: none for recordings and baselines, which answer
-    locally.
+    locally. `cost_usd` are the dollars for the calls, `most_usd` those if every reply had the
+    maximum length and no call had to be repeated; None where no price is known.
     """
 
     model: ModelConfig
@@ -336,8 +330,12 @@ class Estimate:
     calls: int = 0
     prompt_tokens: int = 0
     reply_tokens: int = 0
-    _cost_usd: float = 0.0
-    _most_usd: float = 0.0
+    cost_usd: float | None = None
+    most_usd: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.tariff is not None:
+            self.cost_usd = self.most_usd = 0.0
 
     def add_call(self, expected: CallEstimate) -> None:
         """Count one call to be made, with a reply of typical length."""
@@ -345,21 +343,11 @@ class Estimate:
         prompt, reply = expected.prompt_tokens, expected.completion_tokens
         self.prompt_tokens += prompt
         self.reply_tokens += reply
-        if self.tariff is not None:
+        if self.tariff is not None and self.cost_usd is not None and self.most_usd is not None:
             batched, most = self.model.batch, expected.most_completion_tokens
             price = price_at(self.tariff, batched=batched)
-            self._cost_usd += (prompt * price.input + reply * price.output) / 1_000_000
-            self._most_usd += most_usd(self.tariff, prompt, most, batched=batched)
-
-    @property
-    def cost_usd(self) -> float | None:
-        """Dollars for the calls."""
-        return None if self.tariff is None else self._cost_usd
-
-    @property
-    def most_usd(self) -> float | None:
-        """Dollars if every reply had the maximum length and no call had to be repeated."""
-        return None if self.tariff is None else self._most_usd
+            self.cost_usd += (prompt * price.input + reply * price.output) / 1_000_000
+            self.most_usd += most_usd(self.tariff, prompt, most, batched=batched)
 
     @property
     def may_cost(self) -> bool:

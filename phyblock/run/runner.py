@@ -81,6 +81,7 @@ class Stopping:
         return f"Stopping: {self.reason}; waiting for {calls} (Ctrl-C again to give them up)."
 
 
+_INTERRUPTED = Stopping("interrupted", "interrupted")
 RunEvent = RunStarted | SampleDone | ModelEvent | Stopping
 
 _Result = TypeVar("_Result")
@@ -161,12 +162,9 @@ class Session:
         if self._whole is not None:
             loop, task = self._whole
             # Only once, since replies must be written; a closed loop has nothing to stop.
-            heed = task.cancel if self._interrupts == 2 else self._heed
+            heed = task.cancel if self._interrupts == 2 else self._stop
             with contextlib.suppress(RuntimeError):
                 loop.call_soon_threadsafe(heed)
-
-    def _heed(self) -> None:
-        self._stop(Stopping("interrupted", "interrupted"))
 
     async def run(self) -> RunResult:
         """Open the folder, ask all samples without a final record, and close it.
@@ -183,7 +181,7 @@ class Session:
                 self._open(stack)
                 await asyncio.sleep(0)
                 if self._interrupts:
-                    self._heed()
+                    self._stop()
                 try:
                     await self._ask_all()
                 except BaseException:
@@ -310,11 +308,19 @@ class Session:
         await self._store.records.drain()
 
     async def _work(self, model: str) -> None:
-        """Ask until the queue is empty; it is emptied when its model or the run is stopped."""
+        """Ask, judge and record samples until the queue is empty, as it is when its model or the
+        run is stopped.
+        """
         queue = self._queues[model]
         while queue:
+            sample = queue.popleft()
             try:
-                await self._one(queue.popleft())
+                item = sample.track.shown(sample.item, sample.seed)
+                record = await (self._play if sample.track.plays else self._ask)(sample, item)
+                await self._store.records.put(record)
+                summary = Summary.of(record)
+                self.result.add(summary)
+                self.watch(SampleDone(summary))
             except UnavailableError as error:
                 queue.clear()
                 if model not in self.result.stopped:
@@ -338,7 +344,7 @@ class Session:
         """Number of calls that were sent and have not ended."""
         return sum(getattr(model, "under_way", 0) for model in self._models.values())
 
-    def _stop(self, stop: Stopping) -> None:
+    def _stop(self, stop: Stopping = _INTERRUPTED) -> None:
         if self.result.stop is None:
             self.result.stop = stop = replace(stop, in_flight=self.under_way)
             for queue in self._queues.values():
@@ -365,15 +371,6 @@ class Session:
             raise
         finally:
             self._waiting.discard(task)
-
-    async def _one(self, sample: Sample) -> None:
-        """Ask one sample, judge the reply, and wait until its record is on disk."""
-        item = sample.track.shown(sample.item, sample.seed)
-        record = await (self._play if sample.track.plays else self._ask)(sample, item)
-        await self._store.records.put(record)
-        summary = Summary.of(record)
-        self.result.add(summary)
-        self.watch(SampleDone(summary))
 
     async def _ask(self, sample: Sample, item: Item) -> Record:
         track, params = sample.track, sample.model.params

@@ -166,6 +166,15 @@ def begun(
     sample: str, track: Track, model: str, item: Item, seed: int, answer: Reply | ModelError | None
 ) -> dict[str, Any]:
     """Return the fields of a record before judgement; None is a reply missing in a recording."""
+    error = None
+    if isinstance(answer, ModelError):
+        kind: ErrorKind = "unavailable"
+        if isinstance(answer, RetryableError):
+            kind = "retryable"
+        elif isinstance(answer, SampleError):
+            kind = "refused" if isinstance(answer, RefusedError) else "sample"
+        known = {"kind": kind, "status": answer.status, "billed_usd": answer.billed_usd}
+        error = StoredError.model_validate({**known, "message": str(answer)})
     return {
         "sample": sample,
         "track": track.name,
@@ -174,7 +183,7 @@ def begun(
         **about_item(track, item),
         "seed": seed,
         "reply": answer.storable() if isinstance(answer, Reply) else None,
-        "error": _error(answer) if isinstance(answer, ModelError) else None,
+        "error": error,
         "prompt": None,
         "parse": None,
         "scores": (),
@@ -194,7 +203,14 @@ def judged(track: Track, item: Item, fields: Mapping[str, Any], judgement: Judge
 
     `fields` are those of a record before judgement, or of an earlier record.
     """
-    outcome = _outcome(fields["reply"], fields["error"], judgement.is_read)
+    reply, error = fields["reply"], fields["error"]
+    outcome: Outcome = "ok" if judgement.is_read else "parse_failure"
+    if error is not None:
+        outcome = "refusal" if error.kind == "refused" else "api_error"
+    elif reply is None:
+        outcome = "missing"
+    elif reply.finish in ("refusal", "length"):
+        outcome = "refusal" if reply.finish == "refusal" else "truncated"
     found = {**fields, "outcome": outcome, **judgement.fields}
     record = track.record_type().model_validate(found)
     if counts := track.counts(item, record):
@@ -205,19 +221,38 @@ def judged(track: Track, item: Item, fields: Mapping[str, Any], judgement: Judge
 def judge_episode(
     track: Track, item: Item, fields: Mapping[str, Any], episode: Episode, replies: Sequence[Reply]
 ) -> Record:
-    """Return the record of an episode so far, with these replies."""
+    """Return the record of an episode so far, with the sum of these replies and the last text.
+
+    The sum counts as truncated or refused only if all of them are, and is unknown where a part is.
+    """
     judgement = episode.judgement()
-    if replies:
-        first = judgement.fields["turns"][0]["prompt"]
-        fields = {**fields, "reply": _pooled(replies).storable(), "prompt": first}
-    return judged(track, item, fields, judgement)
+    if not replies:
+        return judged(track, item, fields, judgement)
+
+    def total(values: list[Any]) -> Any:
+        return None if None in values else plain_sum(values)
+
+    billed = [reply.billed_usd for reply in replies if reply.billed_usd is not None]
+    ends = {reply.finish for reply in replies}
+    usages = [reply.usage for reply in replies]
+    pooled = Reply(
+        text=replies[-1].text,
+        finish=ends.pop() if len(ends) == 1 else "stop",
+        usage=Usage(**{n: total([getattr(one, n) for one in usages]) for n in Usage.model_fields}),
+        cost_usd=total([reply.cost_usd for reply in replies]),
+        billed_usd=plain_sum(billed) if billed else None,
+        latency_s=plain_sum(reply.latency_s for reply in replies),
+        provider_model=replies[-1].provider_model,
+        attempts=sum(reply.attempts for reply in replies),
+        cached=all(reply.cached for reply in replies),
+        seed_sent=all(reply.seed_sent for reply in replies),
+    )
+    first = judgement.fields["turns"][0]["prompt"]
+    return judged(track, item, {**fields, "reply": pooled.storable(), "prompt": first}, judgement)
 
 
 async def judge_reply(
-    track: Track,
-    item: Item,
-    fields: Mapping[str, Any],
-    earlier: Record | None = None,
+    track: Track, item: Item, fields: Mapping[str, Any], earlier: Record | None = None
 ) -> Record:
     """Return the record of a sample with one request, judged for the first time or again after an
     `earlier` record.
@@ -234,54 +269,6 @@ async def judge_reply(
         lacking = StoredError(kind="unjudged", message=str(error))
         nothing = await track.judge_apart(item, None, None)
         return judged(track, item, {**fields, "error": lacking}, nothing)
-
-
-def _outcome(reply: Reply | None, error: StoredError | None, readable: bool) -> Outcome:
-    if error is not None:
-        return "refusal" if error.kind == "refused" else "api_error"
-    if reply is None:
-        return "missing"
-    if reply.finish == "refusal":
-        return "refusal"
-    if reply.finish == "length":
-        return "truncated"
-    return "ok" if readable else "parse_failure"
-
-
-def _error(error: ModelError) -> StoredError:
-    kind: ErrorKind = "unavailable"
-    if isinstance(error, RetryableError):
-        kind = "retryable"
-    elif isinstance(error, SampleError):
-        kind = "refused" if isinstance(error, RefusedError) else "sample"
-    message, billed_usd = str(error), error.billed_usd
-    return StoredError(kind=kind, status=error.status, message=message, billed_usd=billed_usd)
-
-
-def _pooled(replies: Sequence[Reply]) -> Reply:
-    """Return the sum of an episode's replies, with the text of the last one.
-
-    It counts as truncated or refused only if all of them are; a sum is unknown if any part is.
-    """
-
-    def total(values: list[Any]) -> Any:
-        return None if None in values else plain_sum(values)
-
-    billed = [reply.billed_usd for reply in replies if reply.billed_usd is not None]
-    ends = {reply.finish for reply in replies}
-    usages = [reply.usage for reply in replies]
-    return Reply(
-        text=replies[-1].text,
-        finish=ends.pop() if len(ends) == 1 else "stop",
-        usage=Usage(**{n: total([getattr(one, n) for one in usages]) for n in Usage.model_fields}),
-        cost_usd=total([reply.cost_usd for reply in replies]),
-        billed_usd=plain_sum(billed) if billed else None,
-        latency_s=plain_sum(reply.latency_s for reply in replies),
-        provider_model=replies[-1].provider_model,
-        attempts=sum(reply.attempts for reply in replies),
-        cached=all(reply.cached for reply in replies),
-        seed_sent=all(reply.seed_sent for reply in replies),
-    )
 
 
 class Summary(NamedTuple):
@@ -492,7 +479,7 @@ class RunStore:
             others = [m for m in (*found.models, *found.others) if m.name not in named]
             changes = {"created": found.created, "others": tuple(others)}
             manifest = manifest.model_copy(update=changes)
-        atomic_write(self._folder / MANIFEST, manifest_text(manifest), sync=True)
+        atomic_write(self._folder / MANIFEST, dump_yaml(manifest.fields()), sync=True)
 
 
 def _selection(manifest: Manifest) -> tuple[list[str], object]:
@@ -575,14 +562,9 @@ def write_run(folder: Path, manifest: Manifest, records: Iterable[Record]) -> No
     lines = (line.encode("utf-8", "replace") for line in record_lines(records))
     OutFolder(folder).claim([])
     # A kill between the two leaves a run that has to be rescored.
-    for name, data in ((RECORDS, lines), (MANIFEST, manifest_text(manifest))):
+    for name, data in ((RECORDS, lines), (MANIFEST, dump_yaml(manifest.fields()))):
         with writing(folder / name):
             atomic_write(folder / name, data, sync=True)
-
-
-def manifest_text(manifest: Manifest) -> str:
-    """Return the text of `run.yaml`."""
-    return dump_yaml(manifest.fields())
 
 
 def record_lines(records: Iterable[Record]) -> Iterator[str]:

@@ -186,7 +186,7 @@ def test_calls_change_no_setting_logger_variable_or_class_of_the_callers_librari
 FIRST = """
 import asyncio, os, sys
 from phyblock.models.model import RetryPolicy, build_model
-from phyblock.config.models import ModelConfig, group_names, load_models
+from phyblock.config.models import ModelConfig, load_models
 from phyblock.config.suite import Suite
 from tests.models.factory import make_request
 os.chdir(sys.argv[1])
