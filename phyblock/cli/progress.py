@@ -141,12 +141,21 @@ class ProgressView:
         """Print due lines; called several times a second. `asks`: calls are in progress."""
         self._shown_s = now_s = self._now()
         self._has_asked |= asks
-        preparing = "" if self._has_asked else self._preparing(now_s)
+        lasted = _duration(now_s - self._started_s)
+        preparing = "" if self._has_asked else f"Preparing scenes ... ({lasted})"
         for tally in self._tallies.values():
             self._progress.update(tally.task.id, facts=preparing or tally.facts)
         if not self._is_terminal and now_s - self._last_line_s >= _LINE_EVERY_S:
             self._last_line_s = now_s
-            self._print(self._line(now_s))
+            tallies = list(self._tallies.values())
+            done = sum(int(tally.task.completed) for tally in tallies)
+            total = sum(int(tally.task.total or 0) for tally in tallies)
+            failures = sum((tally.failures for tally in tallies), Counter[str]())
+            numbers = {name.replace("_", " "): n for name, n in sorted(failures.items())}
+            numbers["sent again"] = sum(tally.retries for tally in tallies)
+            facts = [f"{done:,} of {counted(total, 'sample')} after {lasted}"]
+            facts += [f"{n:,} {name}" for name, n in numbers.items() if n]
+            self._print(preparing or ", ".join(facts))
 
     @property
     def cost_text(self) -> str:
@@ -164,22 +173,6 @@ class ProgressView:
         """Print a line; a closed output must not end calls that cost money."""
         with contextlib.suppress(OSError):
             self._console.print(Text(one_line(line), style=style))
-
-    def _preparing(self, now_s: float) -> str:
-        return f"Preparing scenes ... ({_duration(now_s - self._started_s)})"
-
-    def _line(self, now_s: float) -> str:
-        """Return the progress of the run as a line."""
-        if not self._has_asked:
-            return self._preparing(now_s)
-        tallies = list(self._tallies.values())
-        done = sum(int(tally.task.completed) for tally in tallies)
-        total = sum(int(tally.task.total or 0) for tally in tallies)
-        text = f"{done:,} of {counted(total, 'sample')} after {_duration(now_s - self._started_s)}"
-        failures = sum((tally.failures for tally in tallies), Counter[str]())
-        numbers = {name.replace("_", " "): n for name, n in sorted(failures.items())}
-        numbers["sent again"] = sum(tally.retries for tally in tallies)
-        return ", ".join([text, *(f"{n:,} {name}" for name, n in numbers.items() if n)])
 
 
 def _duration(seconds: float) -> str:

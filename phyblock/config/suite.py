@@ -271,13 +271,6 @@ class VarySpec(Section):
         )
 
 
-def _with_value(spec: SectionT, path: tuple[str, ...], value: Any) -> SectionT:
-    """Return a suite or section with another value at a path of fields; unchanged for none."""
-    for end in range(len(path) - 1, -1, -1):
-        value = functools.reduce(getattr, path[:end], spec).model_copy(update={path[end]: value})
-    return value if path else spec
-
-
 @dataclass(frozen=True)
 class SuiteFiles:
     """The file of a suite, and the files that it names.
@@ -344,7 +337,28 @@ class Suite(Section):
         conflicts = list(self._conflicts())
         yield from conflicts
         for factor in self.vary.factors if not conflicts else ():
-            yield from self._vary_faults(factor)
+            # The tracks must support a factor, and other fields allow it.
+            at, path = ("vary", factor), self._field(factor)
+            message = allowed = hint = ""
+            for kind in map(known_track, self.tracks):
+                if factor not in kind.varies:
+                    message, allowed = f"does not apply to {kind.name}", ", ".join(kind.varies)
+            if not message and factor == "prompt" and len(self.tracks) > 1:
+                message = "is varied in a suite of several tracks, each of which has its own"
+                hint = "run one track at a time"
+            elif factor in ("background", "view") and self.images.source == "dataset":
+                message = "cannot be varied in the data set's own pictures"
+                hint = "use images.source: render"
+            if message:
+                yield Fault(message, allowed, at=at, hint=hint, key=True)
+                continue
+            first, around = self.vary.values(factor)[0], functools.reduce(getattr, path[:-1], self)
+            if path and path[-1] in around.model_fields_set and getattr(around, path[-1]) != first:
+                message = f"is varied by vary.{factor}, whose first level is the reference"
+                yield Fault(message, str(first), at=path, hint="remove it, or change vary")
+            for place, level in enumerate(self.vary.names(factor)):
+                for conflict in self.at(Variant(((factor, level),)))._conflicts():
+                    yield conflict._replace(at=(*at, place))
 
     @property
     def files(self) -> SuiteFiles:
@@ -376,7 +390,11 @@ class Suite(Section):
         levels = {name: self.vary.names(name)[0] for name in self.vary.factors}
         for factor, level in {**levels, **dict(variant.levels)}.items():
             value = self.vary.values(factor)[self.vary.names(factor).index(level)]
-            suite = _with_value(suite, self._field(factor), value)
+            path = self._field(factor)
+            for end in range(len(path) - 1, -1, -1):
+                around = functools.reduce(getattr, path[:end], suite)
+                value = around.model_copy(update={path[end]: value})
+            suite = value if path else suite
         return suite
 
     def _field(self, factor: str) -> tuple[str, ...]:
@@ -435,30 +453,6 @@ class Suite(Section):
         for is_broken, name, message, hint in clashes:
             if is_broken:
                 yield Fault(message, at=tuple(name.split(".")), hint=hint)
-
-    def _vary_faults(self, factor: str) -> Iterator[Fault]:
-        """Yield the faults of a factor: its tracks must support it, and other fields allow it."""
-        at, path = ("vary", factor), self._field(factor)
-        message = allowed = hint = ""
-        for kind in map(known_track, self.tracks):
-            if factor not in kind.varies:
-                message, allowed = f"does not apply to {kind.name}", ", ".join(kind.varies)
-        if not message and factor == "prompt" and len(self.tracks) > 1:
-            message = "is varied in a suite of several tracks, each of which has its own"
-            hint = "run one track at a time"
-        elif factor in ("background", "view") and self.images.source == "dataset":
-            message = "cannot be varied in the data set's own pictures"
-            hint = "use images.source: render"
-        if message:
-            yield Fault(message, allowed, at=at, hint=hint, key=True)
-            return
-        first, section = self.vary.values(factor)[0], functools.reduce(getattr, path[:-1], self)
-        if path and path[-1] in section.model_fields_set and getattr(section, path[-1]) != first:
-            message = f"is varied by vary.{factor}, whose first level is the reference"
-            yield Fault(message, str(first), at=path, hint="remove it, or change vary")
-        for place, level in enumerate(self.vary.names(factor)):
-            for conflict in self.at(Variant(((factor, level),)))._conflicts():
-                yield conflict._replace(at=(*at, place))
 
 
 def suite_model() -> type[Suite]:

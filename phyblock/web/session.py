@@ -22,7 +22,6 @@ from pydantic import JsonValue
 
 from phyblock.config.models import HUMAN, ModelConfig
 from phyblock.config.suite import Suite
-from phyblock.domain.scene import AssemblyTask
 from phyblock.errors import Problem, SpecError
 from phyblock.models.request import HaltedError, Image, Request
 from phyblock.records.record import Reply, Usage
@@ -94,18 +93,14 @@ class PersonModel:
     async def ask(self, request: Request) -> Reply:
         """Return the reply in the form of the prompt. Raises HaltedError after the end."""
         if self._spare is not None and not self._session.done:
-            item, self._spare = self._spare, None
-            await self._warm_up(item)
+            track, seed = self._plan.tracks[0], self._plan.suite.seeds[0]
+            shown, self._spare = track.shown(self._spare, seed), None
+            first = await track.request(shown, seed, {}, with_messages=True)
+            reply = await self._answered(first, is_warm_up=True)
+            fields = begun("warm-up", track, self.name, shown, seed, reply)
+            record = await judge_reply(track, shown, fields)
+            self._session.warmed(went(record, self._plan.suite.scoring.matchers[0]))
         return await self._answered(request)
-
-    async def _warm_up(self, item: AssemblyTask) -> None:
-        track, seed = self._plan.tracks[0], self._plan.suite.seeds[0]
-        shown = track.shown(item, seed)
-        request = await track.request(shown, seed, {}, with_messages=True)
-        reply = await self._answered(request, is_warm_up=True)
-        fields = begun("warm-up", track, self.name, shown, seed, reply)
-        record = await judge_reply(track, shown, fields)
-        self._session.warmed(went(record, self._plan.suite.scoring.matchers[0]))
 
     async def _answered(self, request: Request, *, is_warm_up: bool = False) -> Reply:
         by_hand = kind_of(request.track).by_hand
