@@ -282,10 +282,9 @@ def play(
     import webbrowser
 
     from phyblock.results.load import load_run
-    from phyblock.web.ending import Ending
     from phyblock.web.report import files_of, report_files
     from phyblock.web.server import Server
-    from phyblock.web.session import Person, PlaySession, plan_session
+    from phyblock.web.session import Ending, Person, PlaySession, plan_session
 
     person = Person(name, exact)
     plan = plan_session(read_suite(suite, sets), person, limit)
