@@ -24,7 +24,9 @@ def test_what_init_lays_out_is_sound_and_its_prompts_are_used(workspace, suite):
     assert prompt.with_name(f"{prompt.stem}_json.j2") in prompts
     words = ("run", f"mine/benchmarks/{suite}.yaml", "--models", "alpha", "--limit", "3")
     words += ("--dry-run", "--models-file", "mine/models.yaml")
-    assert "calls, unknown cost of 1 model" in workspace.does(*words).out
+    out = workspace.does(*words).out
+    assert "calls, unknown cost of 1 model" in out
+    assert "A run would not begin:\nmodel alpha: needs an API key" in out
     prompt.write_text("{% block user %}{{ gone }}{% endblock %}", encoding="utf-8")
     assert f"prompts/{prompt.name}:1: block user: " in workspace.phyblock(*words).err
 
