@@ -19,18 +19,9 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from phyblock.config.suite import Suite
 from phyblock.config.validation import PictureControls
 from phyblock.data.official import official_prompt
-from phyblock.domain.scene import (
-    AssemblyTask,
-    Block,
-    Candidate,
-    CandidateSet,
-    Kind,
-    Plan,
-    Scene,
-)
+from phyblock.domain.scene import AssemblyTask, Block, Candidate, CandidateSet, Kind, Plan, Scene
 from phyblock.errors import DataError, Problem
 from phyblock.files import bundled
 from phyblock.parsing.plan import ParsedPlan, parse_plan, plan_form
@@ -146,10 +137,11 @@ def units(candidates: CandidateSet, setting: Setting, areas: Areas | None = None
         numbers_of[one.kind].append(number)
     made = []
     for number, one in enumerate(candidates.candidates, 1):
-        same = tuple(numbers_of[one.kind])
-        if setting == "A" or number == same[0]:
-            numbers, area = (number,) if setting == "A" else same, (areas or {}).get(one.color, 0.0)
-            made.append(Unit(numbers, one, len(same), same.index(number), area))
+        same, area = tuple(numbers_of[one.kind]), (areas or {}).get(one.color, 0.0)
+        if setting == "A":
+            made.append(Unit((number,), one, len(same), same.index(number), area))
+        elif number == same[0]:
+            made.append(Unit(same, one, len(same), 0, area))
     return made
 
 
@@ -295,38 +287,31 @@ def color_areas(scene: Scene, view: View) -> Areas:
     return {color: n / len(shown) for color, n in Counter(shown).items()}
 
 
+@functools.lru_cache(maxsize=16)
 def blind_guesses(
-    suite: Suite, pool: Sequence[AssemblyTask], setting: Setting
+    pool: tuple[AssemblyTask, ...], order: CandidateOrder, setting: Setting
 ) -> Callable[..., Plan]:
-    """Return a function from a task of a pool to its plan, in the numbers that are shown.
+    """Return a function from a task of a pool and a view to its plan, in the numbers shown.
 
     A plan that `sees_colors` also uses their areas in the picture of the goal. A place in the list
     is informative only in the file's order, so plans are learned separately for every order. The
     task's own goal is never used, in whatever order it is shown.
     """
-    # A key of `_learned` holds all scenes, and hashing it takes milliseconds.
-    learned = functools.cache(partial(_learned, tuple(pool), suite.candidates.order, setting))
 
-    def plan(task: AssemblyTask, *, sees_colors: bool = False) -> Plan:
-        return learned(task.seed, suite.images.view if sees_colors else None)[task.key]
+    @functools.cache
+    def learned(seed: int, view: View | None) -> dict[str, Plan]:
+        shown = [presented(one, seed, order) for one in pool]
+        scenes = [one.scene for one in shown]
+        candidates = {one.key: one.candidates for one in shown}
+        if view is None:
+            return goal_blind_plans(scenes, candidates, setting)
+        areas = {scene.id: color_areas(scene, view) for scene in scenes}
+        return goal_blind_plans(scenes, candidates, setting, AREA_KEYS, areas=areas)
+
+    def plan(task: AssemblyTask, view: View, *, sees_colors: bool = False) -> Plan:
+        return learned(task.seed, view if sees_colors else None)[task.key]
 
     return plan
-
-
-@functools.lru_cache(maxsize=32)
-def _learned(
-    pool: tuple[AssemblyTask, ...],
-    order: CandidateOrder,
-    setting: Setting,
-    seed: int,
-    view: View | None,
-) -> dict[str, Plan]:
-    shown = [presented(one, seed, order) for one in pool]
-    scenes, candidates = [one.scene for one in shown], {one.key: one.candidates for one in shown}
-    if view is None:
-        return goal_blind_plans(scenes, candidates, setting)
-    areas = {scene.id: color_areas(scene, view) for scene in scenes}
-    return goal_blind_plans(scenes, candidates, setting, AREA_KEYS, areas=areas)
 
 
 def plan_text(steps: Iterable[int]) -> str:
@@ -464,7 +449,8 @@ class FullPlanning(SceneTrack):
     def open(self) -> None:
         """Select scenes."""
         super().open()
-        self._guess = blind_guesses(self.suite, self.dataset.tasks, self.suite.settings[0])
+        suite, pool = self.suite, tuple(self.dataset.tasks)
+        self._guess = blind_guesses(pool, suite.candidates.order, suite.settings[0])
         self._scorers: dict[object, AssemblyScorer] = {}
 
     def open_prompt(self) -> Prompt:
@@ -479,7 +465,8 @@ class FullPlanning(SceneTrack):
 
     def subject_of(self, item: AssemblyTask) -> PlanSubject:
         """Return the subject of baselines."""
-        return PlanSubject(item.scene, item.candidates, partial(self._guess, item))
+        view = self.suite.images.view
+        return PlanSubject(item.scene, item.candidates, partial(self._guess, item, view))
 
     def judge(self, item: AssemblyTask, text: str | None) -> Judgement:
         """Parse and score a reply; a missing reply (None) is scored as an empty plan."""

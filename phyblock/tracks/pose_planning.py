@@ -194,12 +194,7 @@ class PoseRecord(Record):
         return tuple(world.values())
 
 
-_END = ("end", "moved_cm", "overlap_cm", "knocked")
-_WHOLE = ("reached", "iou", "completed", "engine")
-Ended = tuple[Sequence[Mapping[str, Any]], Mapping[str, Any]]
-"""Endings of the steps of an executed plan, and the final world, as in records."""
-
-
+_ENDED = ("end", "moved_cm", "overlap_cm", "knocked")
 _scorer = functools.lru_cache(maxsize=32)(PoseScorer)
 
 
@@ -220,8 +215,14 @@ def judge_poses(
     blocks = [put(step, item.candidates) for step in given]
     poses = scorer.score(numbers, blocks)
     fits = poses[0].fits
-    ended, whole = _ended_before(earlier, given) or _executed(item.scene, blocks)
-    errors = pose_errors(scorer.goal, numbers, fits, [step["end"] for step in ended])
+    steps = [{"block": step.candidate, "center_cm": step.center_cm} for step in given]
+    pose: Mapping[str, Any] = {}
+    if isinstance(earlier, PoseRecord) and earlier.pose is not None and earlier.parse is not None:
+        known = [step.fields() for step in earlier.parse.steps]
+        pose = earlier.pose.fields() if known == steps else {}
+    if pose.get("limits") != _LIMITS or len(pose["steps"]) != len(steps):
+        pose = _executed(item.scene, blocks)
+    errors = pose_errors(scorer.goal, numbers, fits, [step["end"] for step in pose["steps"]])
     # The plan without its poses, under every setting and matcher.
     plan = [number for number in numbers if 1 <= number <= n]
     scores = AssemblyScorer(item.scene, item.candidates, settings).score(
@@ -233,33 +234,26 @@ def judge_poses(
         "plan": plan,
         "dropped": [number for number in numbers if not 1 <= number <= n],
         "problem": parsed.problem,
-        "steps": [{"block": step.candidate, "center_cm": step.center_cm} for step in given],
+        "steps": steps,
     }
-    steps = [
-        {**({"vertex": None} if fit is None else asdict(fit)), **end, "error": error}
-        for fit, end, error in zip(fits, ended, errors, strict=True)
+    scored = [
+        {
+            "vertex": None,
+            **({} if fit is None else asdict(fit)),
+            **{name: end[name] for name in (*_ENDED, "rests") if name in end},
+            "error": error,
+        }
+        for fit, end, error in zip(fits, pose["steps"], errors, strict=True)
     ]
     right = {score.frame: list(score.right) for score in poses}
-    pose = {"right": right, "steps": steps, "limits": _LIMITS, **whole}
-    fields = {"parse": parse, "scores": list(map(vars, scores)), "pose": pose}
-    return Judgement(parsed.rule is not None, fields)
+    fields = {"parse": parse, "scores": list(map(vars, scores))}
+    return Judgement(
+        parsed.rule is not None, {**fields, "pose": {**pose, "right": right, "steps": scored}}
+    )
 
 
-def _ended_before(record: Record | None, given: Sequence[PoseStep]) -> Ended | None:
-    """Return the result in a record of the same steps with these tolerances, or None."""
-    if not isinstance(record, PoseRecord) or record.pose is None or record.parse is None:
-        return None
-    pose = record.pose
-    known = [PoseStep(s.block, s.center_cm) for s in record.parse.steps]
-    if known != list(given) or len(pose.steps) != len(known) or pose.limits != _LIMITS:
-        return None
-    names = (*_END, "rests")
-    steps = tuple({n: v for n, v in step.fields().items() if n in names} for step in pose.steps)
-    return steps, {name: getattr(pose, name) for name in _WHOLE}
-
-
-def _executed(scene: Scene, blocks: Sequence[Block | None]) -> Ended:
-    """Return the result of an execution; the engine executes one plan at a time."""
+def _executed(scene: Scene, blocks: Sequence[Block | None]) -> dict[str, Any]:
+    """Return the fields of an executed plan; the engine executes one plan at a time."""
     with _ONE_AT_A_TIME:
         done = execute(blocks, physics=execution_physics(scene.blocks))
     goal, reached = scene.blocks, blocks_reached(scene.blocks, done.blocks, *_REACHED.values())
@@ -273,10 +267,13 @@ def _executed(scene: Scene, blocks: Sequence[Block | None]) -> Ended:
             if before.distance_m(after) > _STILL_M or before.angle_deg(after) > _STILL_DEG:
                 lies[block.order] = after
                 place = [round(part, 2) + 0.0 for part in center_cm(block)]
-                about = {"step": block.order, "center_cm": place, "euler_deg": block.euler_deg}
-                rests.append(about)
-        steps.append({**{name: getattr(step, name) for name in _END}, "rests": rests})
-    return steps, {
+                rests.append(
+                    {"step": block.order, "center_cm": place, "euler_deg": block.euler_deg}
+                )
+        steps.append({**{name: getattr(step, name) for name in _ENDED}, "rests": rests})
+    return {
+        "steps": steps,
+        "limits": _LIMITS,
         "reached": reached,
         "iou": round(voxel_iou(goal, done.blocks), _DIGITS),
         "completed": reached == len(goal) == len(done.blocks),

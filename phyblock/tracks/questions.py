@@ -39,13 +39,12 @@ from phyblock.parsing.text import AnswerForm
 from phyblock.records.files import Manifest
 from phyblock.records.record import Line, Record, Whole
 from phyblock.scoring.plan import chance
-from phyblock.sim.pictures import PictureStyle
 from phyblock.sim.question_pictures import question_key, question_png
 from phyblock.text import hex_digest
 from phyblock.tracks.base import Choice, Judgement, Picking, Track, limited, select_tasks
 from phyblock.tracks.measures import OVERALL, WHOLE, Cell, SampleCounts
 from phyblock.tracks.pictures import Drawing, picture_style
-from phyblock.types import Background, DataFormat
+from phyblock.types import DataFormat
 
 BUILTIN_QUESTIONS = "phyblock-vqa"
 """The question set of suites that name none."""
@@ -319,29 +318,6 @@ class AskedQuestion:
         return self.task.scene
 
 
-def question_drawings(
-    item: AskedQuestion, style: PictureStyle, background: Background | None = None
-) -> tuple[Drawing, ...]:
-    """Return the pictures of a question: scene, the block by itself if there is one, options.
-
-    `background` overrides the backgrounds of questions; questions without one have the style's.
-    Raises DataError for a missing picture.
-    """
-    recipes = {recipe.label: recipe for recipe in item.question.pictures}
-    n, files = len(item.question.options), item.task.files
-    paths = {rotated_label(at, item.rotation, n): path for at, path in files.items()}
-    drawings = {}
-    for label in ("scene", "block", *LETTERS):
-        if label in paths:
-            read = partial(read_picture, paths[label])
-            drawings[label] = Drawing(label, hex_digest(read()), read, is_file=True)
-        elif label in recipes:
-            recipe = recipes[label]
-            recipe = replace(recipe, background=background or recipe.background)
-            drawings[label] = Drawing.of(label, question_key, question_png, recipe, style)
-    return tuple(drawings.values())
-
-
 class Vqa(Track):
     """Asks multiple-choice questions."""
 
@@ -393,12 +369,16 @@ class Vqa(Track):
         self.questions = known = open_questions(
             spec.format, suite.files.folders[self.name], self.dataset
         )
-        asked = known.tasks
+        asked = [
+            task
+            for task in known.tasks
+            if task.question.subtask in spec.subtasks and {*suite.levels} & {*task.scene.levels}
+        ]
         if suite.dataset.difficulty.ranges:
             fitting = {one.key for one in select_tasks(self.dataset.tasks, suite, None)}
-            asked = tuple(task for task in known.tasks if task.scene.id in fitting)
-        tasks = select_questions(asked, spec.subtasks, suite.levels, self.limit)
-        if not tasks:
+            asked = [task for task in asked if task.scene.id in fitting]
+        strata = [SUBTASKS.index(task.question.subtask) for task in asked]
+        if not (tasks := limited(asked, strata, self.limit)):
             where = suite.where("vqa", "subtasks")
             found = ", ".join(sorted({task.question.subtask for task in known.tasks}))
             message = "no question is of these subtasks, levels and difficulty"
@@ -411,11 +391,24 @@ class Vqa(Track):
         self._guess = guesses_of([task.question for task in known.tasks], majority_rule)
 
     def draw(self, item: AskedQuestion) -> tuple[Drawing, ...]:
-        """Return the pictures of a question in the style of the suite."""
-        if self.is_blind:
-            return ()
-        images = self.suite.images
-        return question_drawings(item, picture_style(images), images.background)
+        """Return the pictures of a question: scene, the block by itself if there is one, options.
+
+        A background of the suite overrides those of questions. Raises DataError for a missing
+        picture.
+        """
+        images, n, files = self.suite.images, len(item.question.options), item.task.files
+        recipes = {recipe.label: recipe for recipe in item.question.pictures}
+        paths = {rotated_label(at, item.rotation, n): path for at, path in files.items()}
+        drawings = []
+        for label in () if self.is_blind else ("scene", "block", *LETTERS):
+            if label in paths:
+                read = partial(read_picture, paths[label])
+                drawings.append(Drawing(label, hex_digest(read()), read, is_file=True))
+            elif label in recipes:
+                ground = images.background or recipes[label].background
+                what = replace(recipes[label], background=ground), picture_style(images)
+                drawings.append(Drawing.of(label, question_key, question_png, *what))
+        return tuple(drawings)
 
     def about(self, item: AskedQuestion) -> dict[str, Any]:
         """Return the question and its presentation."""
@@ -477,22 +470,6 @@ def open_questions(format_name: str, path: Path, dataset: Dataset) -> QuestionSe
     names = ", ".join(bundled_sets(QUESTIONS_FILE))
     allowed = f"a folder with {QUESTIONS_FILE}, or a bundled set of questions: {names}"
     raise DataError(Problem(str(path), "holds no questions", "vqa.path", allowed=allowed))
-
-
-def select_questions(
-    tasks: Sequence[QuestionTask],
-    subtasks: Sequence[Subtask],
-    levels: Sequence[int],
-    limit: int | None,
-) -> tuple[QuestionTask, ...]:
-    """Return the questions of these subtasks about scenes of these levels, at most `limit`."""
-    wanted, named = set(levels), set(subtasks)
-    chosen = [
-        one
-        for one in tasks
-        if one.question.subtask in named and wanted & set(one.question.scene.levels)
-    ]
-    return limited(chosen, [SUBTASKS.index(one.question.subtask) for one in chosen], limit)
 
 
 TRACK = Vqa

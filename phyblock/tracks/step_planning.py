@@ -323,8 +323,9 @@ class StepPlanning(SceneTrack):
     def open(self) -> None:
         """Select scenes."""
         super().open()
-        self.accepts = self.spec.setting or self.suite.settings[0]
-        self.guess = blind_guesses(self.suite, self.dataset.tasks, self.accepts)
+        suite, pool = self.suite, tuple(self.dataset.tasks)
+        self.accepts = self.spec.setting or suite.settings[0]
+        self.guess = blind_guesses(pool, suite.candidates.order, self.accepts)
         self._fallen: dict[tuple[Block, ...], tuple[int, ...]] = {}
 
     def about(self, item: AssemblyTask) -> dict[str, Any]:
@@ -435,12 +436,12 @@ class StepEpisode:
         track, task, assembly = self._track, self._task, self._assembly
         blocks = tuple(task.scene.blocks[vertex] for vertex in assembly.vertices)
         last = self._turns[-1] if self._turns else {}
-        if last.get("outcome") == "placed" and track.spec.physics != "off":
-            if "fallen" not in last and self._fell is None:
-                last["fallen"] = list(await track.fallen(blocks))
-            elif "fallen" not in last and self._fell is not None:
-                last["fallen"] = list(self._fell.get(assembly.vertices, ()))
-            if last["fallen"] and track.spec.physics == "strict":
+        is_released = track.spec.physics != "off" and last.get("outcome") == "placed"
+        if is_released and "fallen" not in last:
+            known = self._fell
+            fell = await track.fallen(blocks) if known is None else known.get(assembly.vertices, ())
+            last["fallen"] = list(fell)
+            if fell and track.spec.physics == "strict":
                 self._ending = "collapsed"
         if self._ending is not None:
             return None
@@ -452,7 +453,7 @@ class StepEpisode:
         subject = StepSubject(
             task.scene,
             task.candidates,
-            functools.partial(track.guess, task),
+            functools.partial(track.guess, task, track.suite.images.view),
             assembly.right_moves(),
             assembly.exact_moves(),
             self._past[-1].move if failed else None,
@@ -512,9 +513,8 @@ class StepEpisode:
             placed = placed_counts(scene, candidates, setting, chosen, on_ground)
             attempted = attempted_counts(placed, len(plan))
             for name, counts, wrong in (("placed", placed, None), ("attempted", attempted, errors)):
-                about = {"criterion": name, "matcher": None, "setting": setting}
-                of = {"tp": counts.tp, "fp": counts.fp, "fn": counts.fn, "errors": wrong}
-                scores.append({**about, **of})
+                way = {"criterion": name, "matcher": None, "setting": setting}
+                scores.append({**way, **vars(counts), "errors": wrong})
         fields = {
             "parse": {"parser": "move", "rule": None, "plan": plan, "dropped": []},
             "scores": scores,

@@ -1,7 +1,9 @@
 """The track of questions: selection, what is sent in which order, judging, baselines."""
 
+import contextlib
 from collections import Counter
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,30 +13,24 @@ from hypothesis import strategies as st
 from phyblock.data.base import QuestionSet, QuestionTask
 from phyblock.domain.question import LETTERS, SUBTASKS, Question, rotated
 from phyblock.domain.scene import Scene
+from phyblock.errors import SpecError
 from phyblock.models.request import Image
 from phyblock.sim.pictures import PictureStyle
 from phyblock.sim.question_pictures import question_key
 from phyblock.tracks import questions
-from phyblock.tracks.questions import (
-    AskedQuestion,
-    ChoiceSubject,
-    Vqa,
-    question_drawings,
-    select_questions,
-)
+from phyblock.tracks.questions import ChoiceSubject, Vqa
 from tests.tracks.conftest import track_of
 from tests.workspace import in_a_loop
 
 STYLE = PictureStyle(size_px=128)
-LEVELS = (1, 2, 3, 4)
 OPTIONS = ("cube", "arch", "cylinder", "cuboid")
 
 
-def opened(found, shop, size_px=128, **vqa):
+def opened(found, shop, images=None, limit=None, **vqa):
     """The track on a set of questions that is in no file."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(questions, "open_questions", lambda *_: found)
-        return track_of("vqa", shop=shop, images={"size_px": size_px}, vqa=vqa)
+        return track_of("vqa", shop=shop, images=images or {}, limit=limit, vqa=vqa)
 
 
 @in_a_loop
@@ -90,7 +86,9 @@ def test_questions_keep_their_background_unless_a_suite_gives_one(question_set):
         (asked, None, "checkerboard"), (lawn, None, "lawn"), (lawn, "white", "white"),
     ):  # fmt: skip
         style = replace(STYLE, background=wanted)
-        drawn = question_drawings(AskedQuestion(QuestionTask(question)), STYLE, ground)
+        found = QuestionSet("one", question_set.root, (QuestionTask(question),))
+        track = opened(found, None, {"background": ground})
+        drawn = track.draw(track.items[0])
         assert [one.key for one in drawn] == [question_key(picture, style) for picture in bare]
 
 
@@ -119,9 +117,18 @@ tasks = st.lists(st.sampled_from(SUBTASKS[:4]), max_size=60).map(
 some = st.lists(st.sampled_from(SUBTASKS[:7]), min_size=1, unique=True)
 
 
+def select(found, subtasks, limit):
+    """The questions that are asked; a track that would ask none cannot be opened."""
+    with contextlib.suppress(SpecError):
+        known = QuestionSet("drawn", Path(), tuple(found))
+        track = opened(known, None, limit=limit, subtasks=subtasks)
+        return [item.task for item in track.items]
+    return []
+
+
 @given(tasks, some, st.none() | st.integers(1, 40))
 def test_no_more_than_wanted_of_each_and_in_all(given_tasks, subtasks, limit):
-    chosen = select_questions(given_tasks, subtasks, LEVELS, limit)
+    chosen = select(given_tasks, subtasks, limit)
     found = Counter(one.question.subtask for one in given_tasks)
     counts = Counter(one.question.subtask for one in chosen)
     most = {name: found[name] for name in subtasks}
@@ -130,5 +137,5 @@ def test_no_more_than_wanted_of_each_and_in_all(given_tasks, subtasks, limit):
     positions = [given_tasks.index(one) for one in chosen]
     assert positions == sorted(set(positions))
     # A higher limit asks all that a lower one asks.
-    more = select_questions(given_tasks, subtasks, LEVELS, limit and limit + 1)
+    more = select(given_tasks, subtasks, limit and limit + 1)
     assert {one.key for one in chosen} <= {one.key for one in more}
