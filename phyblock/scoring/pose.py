@@ -484,11 +484,13 @@ def pose_errors(
     for number, fit, end in zip(numbers, fits, ends, strict=True):
         if fit is None:
             error = goal.error(number, placed) if number in goal.equal else None
-            # Of several steps for one block, all but the nearest are superfluous.
-            is_early = error == "dependency_not_met" and not goal.choices(number, placed)
-            is_turned = error == "incorrect_orientation"
-            unmatched: PoseError = "too_early" if is_early else "wrong_kind"
-            found.append("wrong_rotation" if is_turned else unmatched)
+            if error == "incorrect_orientation":
+                found.append("wrong_rotation")
+            elif error == "dependency_not_met" and not goal.choices(number, placed):
+                found.append("too_early")
+            else:
+                # Of several steps for one block, all but the nearest are superfluous.
+                found.append("wrong_kind")
             continue
         placed |= 1 << fit.vertex
         if fit.turn_deg > TURN_TOLERANCE_DEG:

@@ -549,8 +549,11 @@ def holds(blocks: Sequence[Block], about: int) -> bool | None:
             world.place(*near)
             for is_at_rest in moments(world, _LONGEST_S):
                 moved = _moved(near, world.poses()).values()
-                if is_at_rest or True in moved:
-                    verdict = False if True in moved else None if None in moved else True
+                if True in moved:
+                    verdict = False
+                    break
+                if is_at_rest:
+                    verdict = None if None in moved else True
                     break
         if verdict is None or agreed not in (None, verdict):
             return None
@@ -566,5 +569,5 @@ def _moved(blocks: Sequence[Block], poses: Mapping[int, Pose]) -> dict[int, bool
         distance_m, angle_deg = end.distance_m(start), end.angle_deg(start)
         is_far = distance_m > _MOVED_M or angle_deg > _MOVED_DEG
         is_still = distance_m <= _STILL_M and angle_deg <= _STILL_DEG
-        found[block.order] = True if is_far else False if is_still else None
+        found[block.order] = is_far if is_far or is_still else None
     return found

@@ -121,14 +121,17 @@ class Mesh:
     @functools.cached_property
     def volume_m3(self) -> float:
         """Volume of the solid [m3]."""
-        return float((np.linalg.det(self.corners_m) / 6).sum())
+        return float(self._tetrahedra_m3.sum())
 
     @functools.cached_property
     def center_of_mass_m(self) -> NDArray[np.float64]:
         """Center of mass of the solid, shape (3,) [m]."""
-        tetrahedra_m3 = np.linalg.det(self.corners_m) / 6
-        moments: NDArray[np.float64] = tetrahedra_m3 @ self.corners_m.sum(axis=1) / 4
+        moments: NDArray[np.float64] = self._tetrahedra_m3 @ self.corners_m.sum(axis=1) / 4
         return moments / self.volume_m3
+
+    @property
+    def _tetrahedra_m3(self) -> NDArray[np.float64]:
+        return np.linalg.det(self.corners_m) / 6
 
 
 @dataclass(frozen=True, eq=False)

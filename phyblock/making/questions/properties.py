@@ -79,7 +79,8 @@ class ColorMaker(StaticMaker):
             said = {_said(name or "") for name in named}
             if len(two) == 2 and None not in named and said != {"most"}:
                 slots = {"block": str(named[0]), "other": str(named[1])}
-                yield Draft("co", scene, (picture,), slots, kind=f"co {_said(' '.join(said))}")
+                kind = f"co {_said(' '.join(slots.values()))}"
+                yield Draft("co", scene, (picture,), slots, kind=kind)
 
     def right(self, asked: Draft) -> str:
         """Return the colors of the blocks that the text names."""
