@@ -3,8 +3,10 @@ worlds of scenes in which the true F1 is known.
 """
 
 import functools
+import itertools
 from collections.abc import Iterable, Mapping, Set
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from hypothesis import strategies as st
@@ -36,10 +38,14 @@ def any_edges(draw: st.DrawFn, max_size: int = 6) -> Edges:
 
 
 # Both types look the same after a half turn about z, so 0 and 180 are one orientation.
-TYPES = ("arch", "cuboid3")
-COLORS = ("red", "blue")
-YAWS_DEG = (0.0, 90.0, 180.0)
-FLAT, TURNED = (0.0, 0.0, 0.0), (0.0, 0.0, 90.0)
+KINDS = tuple(itertools.product(("arch", "cuboid3"), ("red", "blue")))
+FLAT, TURNED, BACK = (0.0, 0.0, 0.0), (0.0, 0.0, 90.0), (0.0, 0.0, 180.0)
+
+
+def block(order: int, look: tuple[Any, ...], below: Iterable[int] = ()) -> Block:
+    """A block of type, color and orientation, on those of these orders; it may be anywhere."""
+    kind, color, euler_deg = look
+    return Block(order, kind, color, FLAT, euler_deg, tuple(sorted(below)), 1)
 
 
 @dataclass(frozen=True)
@@ -55,42 +61,30 @@ class Case:
 def cases(draw: st.DrawFn, max_blocks: int = 6, max_steps: int = 8) -> Case:
     """Few looks and many dependencies, so that choices matter; candidates may be lacking."""
     edges = draw(acyclic(max_blocks).filter(bool))
-    kinds = st.tuples(st.sampled_from(TYPES), st.sampled_from(COLORS))
-    palette = draw(st.lists(kinds, min_size=1, max_size=3))
-    blocks = tuple(
-        Block(
-            order,
-            *draw(st.sampled_from(palette)),
-            FLAT,
-            (0.0, 0.0, draw(st.sampled_from(YAWS_DEG))),
-            tuple(sorted(other + 1 for other in needed)),
-            1,
-        )
-        for order, needed in enumerate(edges, 1)
-    )
-    pool = [
-        Candidate(kind, color, (0.0, 0.0, yaw))
-        for kind in TYPES
-        for color in COLORS
-        for yaw in YAWS_DEG[:2]
-    ]
+    palette = draw(st.lists(st.sampled_from(KINDS), min_size=1, max_size=3))
+    looks = st.tuples(st.sampled_from(palette), st.sampled_from([FLAT, TURNED, BACK]))
+    blocks = []
+    for order, needed in enumerate(edges, 1):
+        kind, turn = draw(looks)
+        blocks.append(block(order, (*kind, turn), (other + 1 for other in needed)))
+    pool = [Candidate(*kind, turn) for kind in KINDS for turn in (FLAT, TURNED)]
     chosen = draw(st.permutations(pool))[: draw(st.integers(1, len(pool)))]
     steps = draw(st.lists(st.integers(1, len(chosen)), max_size=max_steps))
-    scene = Scene("s", draw(st.sampled_from([(1, 2), (3,)])), blocks, ("s",))
+    scene = Scene("s", draw(st.sampled_from([(1, 2), (3,)])), tuple(blocks), ("s",))
     return Case(scene, CandidateSet(tuple(chosen)), Plan(tuple(steps)))
 
 
 @st.composite
 def carriers(draw: st.DrawFn) -> Case:
     """Equal cubes that carry blocks of few kinds: what the plan names depends on which it takes."""
-    position = (0.0, 0.0, 0.0)
-    n_cubes = draw(st.integers(2, 3))
-    blocks = [Block(n + 1, "cube", "red", position, FLAT, (), 1) for n in range(n_cubes)]
+    cubes = range(1, draw(st.integers(2, 3)) + 1)
+    base = ("cube", "red", FLAT)
+    blocks = [block(order, base) for order in cubes]
     tops = [("arch", "red", FLAT), ("arch", "red", TURNED), ("arch", "blue", FLAT)]
-    for cube in range(n_cubes):
+    for cube in cubes:
         for top in draw(st.lists(st.sampled_from(tops), min_size=1, max_size=2)):
-            blocks.append(Block(len(blocks) + 1, *top[:2], position, top[2], (cube + 1,), 2))
-    candidates = CandidateSet((Candidate("cube", "red", FLAT), *(Candidate(*top) for top in tops)))
+            blocks.append(block(len(blocks) + 1, top, [cube]))
+    candidates = CandidateSet(tuple(Candidate(*look) for look in (base, *tops)))
     tail = draw(st.lists(st.integers(1, len(candidates)), min_size=3, max_size=7))
     return Case(Scene("s", (3,), tuple(blocks), ("s",)), candidates, Plan((1, *tail)))
 
@@ -104,14 +98,9 @@ def equal(block: Block, candidate: Candidate, setting: Setting) -> bool:
 
 def choices(case: Case, index: int, placed: frozenset[int], setting: Setting) -> list[Block]:
     """Unplaced ready blocks, in file order, that a step may place; `placed` holds orders."""
-    candidate = case.candidates[index]
-    return [
-        block
-        for block in case.scene.blocks
-        if block.order not in placed
-        and placed.issuperset(block.depend)
-        and equal(block, candidate, setting)
-    ]
+    left = (block for block in case.scene.blocks if block.order not in placed)
+    ready = (block for block in left if placed.issuperset(block.depend))
+    return [block for block in ready if equal(block, case.candidates[index], setting)]
 
 
 def greedy_tp(case: Case, setting: Setting) -> int:
@@ -203,7 +192,10 @@ class World:
 
         All models share half the variance of each effect.
         """
-        first, second = self._parents(rng)
+        alone = np.arange(self.bases)
+        couples = np.array([(a, b) for a in alone for b in alone[:a]], dtype=np.intp).reshape(-1, 2)
+        chosen = couples[rng.choice(len(couples), self.pairs, replace=False)]
+        first, second = np.concatenate([np.stack([alone, alone], axis=1), chosen]).T
         single = first == second
         sizes = rng.integers(3, 11, self.bases)
         blocks = np.where(single, sizes[first], sizes[first] + sizes[second])
@@ -223,12 +215,6 @@ class World:
         """F1 of endlessly many scenes, from `worlds` drawings."""
         right, blocks = sum(self.draw(rng)[2] for _ in range(worlds))
         return float(right / blocks)
-
-    def _parents(self, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-        alone = np.arange(self.bases)
-        couples = np.array([(a, b) for a in alone for b in alone[:a]], dtype=np.intp).reshape(-1, 2)
-        chosen = couples[rng.choice(len(couples), self.pairs, replace=False)]
-        return np.concatenate([alone, chosen[:, 0]]), np.concatenate([alone, chosen[:, 1]])
 
     @staticmethod
     def _effects(rng: np.random.Generator, sd: float, size: int, models: int) -> Floats:

@@ -4,44 +4,21 @@ goal block, against plain re-implementations.
 
 from collections import Counter
 from fractions import Fraction
-from itertools import permutations
+from itertools import compress, permutations, product
 
 import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from phyblock.domain.scene import Block, Candidate, CandidateSet, Plan, Scene
-from phyblock.scoring.plan import (
-    BLOCK_OUTCOMES,
-    ERROR_TYPES,
-    AssemblyScorer,
-    Counts,
-    Goal,
-    block_outcomes,
-    level1_counts,
-    match_plan,
-    most_placed,
-    steps_kept,
-)
+from phyblock.domain.scene import Candidate, CandidateSet, Plan, Scene
+from phyblock.scoring import plan as scoring
+from phyblock.scoring.plan import AssemblyScorer, Counts, Goal, match_plan
 from phyblock.types import LEVEL1_CRITERIA, MATCHERS, SETTINGS
-from tests.scoring.cases import (
-    FLAT,
-    TURNED,
-    Case,
-    acyclic,
-    best_of_all,
-    carriers,
-    cases,
-    choices,
-    equal,
-    error_of,
-    greedy_tp,
-    renumbered,
-)
+from tests.scoring import cases as made
+from tests.scoring.cases import FLAT, TURNED, Case, carriers, cases, choices, equal
 
 each_setting = pytest.mark.parametrize("setting", SETTINGS)
-each_matcher = pytest.mark.parametrize("matcher", MATCHERS)
 
 
 def goal_of(case, setting):
@@ -59,16 +36,15 @@ def test_optimal_is_the_best_of_all_sequences_of_choices_and_paper_is_algorithm_
     choices as good as each other, the one with the lightest errors is taken.
     """
     steps, blocks = len(case.plan), len(case.scene)
-    (greatest, *lightest), greedy = best_of_all(case, setting), greedy_tp(case, setting)
-    assert matched(case, setting).counts == Counts(greatest, steps - greatest, blocks - greatest)
-    counts = matched(case, setting, "paper").counts
-    assert counts == Counts(greedy, steps - greedy, blocks - greedy)
-    assert most_placed(goal_of(case, setting), case.plan) == greatest
+    greatest, *lightest = made.best_of_all(case, setting)
+    for matcher, tp in (("optimal", greatest), ("paper", made.greedy_tp(case, setting))):
+        assert matched(case, setting, matcher).counts == Counts(tp, steps - tp, blocks - tp)
+    assert scoring.most_placed(goal_of(case, setting), case.plan) == greatest
     errors = Counter(matched(case, setting).errors)
     assert lightest == [0, errors["overflow"], errors["incorrect_orientation"]]
 
 
-@each_matcher
+@pytest.mark.parametrize("matcher", MATCHERS)
 @each_setting
 @given(case=cases(max_blocks=8, max_steps=12))
 def test_every_step_places_a_ready_equal_block_or_has_the_one_error_that_holds(
@@ -80,43 +56,36 @@ def test_every_step_places_a_ready_equal_block_or_has_the_one_error_that_holds(
         possible = choices(case, index, placed, setting)
         if vertex is None:
             assert not possible
-            assert error == error_of(case, index, placed, setting)
+            assert error == made.error_of(case, index, placed, setting)
         else:
             assert case.scene.blocks[vertex] in possible
             assert error is None
             placed |= {case.scene.blocks[vertex].order}
     assert match.n_blocks == len(case.scene)
-    assert sum(map(match.errors.count, ERROR_TYPES)) == match.counts.fp
+    assert sum(map(match.errors.count, scoring.ERROR_TYPES)) == match.counts.fp
 
 
 COUNTS = st.builds(Counts, *[st.integers(0, 1000)] * 3)
 
 
 def level1(case, setting, criterion):
-    return level1_counts(goal_of(case, setting), case.plan, criterion)
+    return scoring.level1_counts(goal_of(case, setting), case.plan, criterion)
 
 
 @each_setting
 @given(case=cases())
-def test_selection_is_a_one_to_one_matching_without_order(setting, case):
-    left = list(case.scene.blocks)
+def test_selection_matches_one_to_one_without_order_and_membership_counts_what_occurs(
+    setting, case
+):
+    left, occurring = list(case.scene.blocks), 0
     for index in case.plan.steps:
-        hit = next((b for b in left if equal(b, case.candidates[index], setting)), None)
-        if hit is not None:
+        alike = [one for one in case.scene.blocks if equal(one, case.candidates[index], setting)]
+        occurring += bool(alike)
+        if hit := next((one for one in alike if one in left), None):
             left.remove(hit)
-    tp = len(case.scene) - len(left)
-    assert level1(case, setting, "selection") == Counts(tp, len(case.plan) - tp, len(left))
-
-
-@each_setting
-@given(case=cases())
-def test_membership_counts_every_step_whose_block_occurs(setting, case):
-    tp = sum(
-        any(equal(block, case.candidates[index], setting) for block in case.scene.blocks)
-        for index in case.plan.steps
-    )
-    counts = level1(case, setting, "membership")
-    assert counts == Counts(tp, len(case.plan) - tp, len(case.scene) - tp)
+    steps, n = len(case.plan), len(case.scene)
+    for criterion, tp in (("selection", n - len(left)), ("membership", occurring)):
+        assert level1(case, setting, criterion) == Counts(tp, steps - tp, n - tp)
 
 
 @given(counts=st.lists(COUNTS, max_size=8), data=st.data())
@@ -143,17 +112,15 @@ def test_f1_is_the_harmonic_mean_of_precision_and_recall(counts):
 
 @given(case=cases(), level1=st.sampled_from([None, *LEVEL1_CRITERIA]))
 def test_the_scorer_says_what_its_parts_say(case, level1):
-    scores = AssemblyScorer(case.scene, case.candidates, SETTINGS).score(
-        case.plan, MATCHERS, level1
-    )
-    expected = []
+    scorer = AssemblyScorer(case.scene, case.candidates, SETTINGS)
+    scores, expected = scorer.score(case.plan, MATCHERS, level1), []
     for setting in SETTINGS:
         goal = goal_of(case, setting)
         for matcher in MATCHERS:
             match = match_plan(goal, case.plan, matcher)
             expected.append(("aov", setting, matcher, match.counts, match.vertices))
         if level1 is not None and 1 in case.scene.levels:
-            counts = level1_counts(goal, case.plan, level1)
+            counts = scoring.level1_counts(goal, case.plan, level1)
             expected.append((level1, setting, None, counts, None))
     found = [
         (one.criterion, one.setting, one.matcher, Counts(one.tp, one.fp, one.fn), one.placed)
@@ -162,8 +129,7 @@ def test_the_scorer_says_what_its_parts_say(case, level1):
     assert found == expected
     for score in scores:
         if score.criterion == "aov":
-            assert sum(score.errors.values()) == score.fp
-            assert len(score.why) == len(case.plan)
+            assert (sum(score.errors.values()), len(score.why)) == (score.fp, len(case.plan))
         else:
             assert (score.errors, score.why) == (None, None)
 
@@ -180,56 +146,45 @@ def test_what_was_scored_before_changes_nothing(case, data):
 
 def outcomes(case, setting):
     placed = matched(case, setting).counts.tp
-    (counted,) = block_outcomes(goal_of(case, setting), case.plan, [placed])
+    (counted,) = scoring.block_outcomes(goal_of(case, setting), case.plan, [placed])
     return counted
 
 
 def kept(case, setting):
-    return steps_kept(goal_of(case, setting), case.plan)
-
-
-def closed(case):
-    """Every set of orders of blocks that can stand, each on all that it depends on."""
-    n = len(case.scene)
-    for mask in range(1 << n):
-        chosen = [block for v, block in enumerate(case.scene.blocks) if mask >> v & 1]
-        orders = frozenset(block.order for block in chosen)
-        if all(orders.issuperset(block.depend) for block in chosen):
-            yield orders
+    return scoring.steps_kept(goal_of(case, setting), case.plan)
 
 
 def standing(case, setting, spare):
     """The most blocks that steps stand for one to one in a set that can stand, in which so many
     more of a kind may be.
     """
-    blocks = {block.order: block for block in case.scene.blocks}
     most = 0
-    for orders in closed(case):
+    for mask in product((False, True), repeat=len(case.scene)):
+        chosen = [*compress(case.scene.blocks, mask)]
+        orders = {block.order for block in chosen}
+        if not all(orders.issuperset(block.depend) for block in chosen):
+            continue
         left, more = list(case.plan.steps), Counter(spare)
-        count = 0
-        for block in (blocks[order] for order in orders):
+        for block in chosen:
             step = next((i for i in left if equal(block, case.candidates[i], setting)), None)
             if step is None:
                 more[block.kind] -= 1
             else:
                 left.remove(step)
-                count += 1
         if min(more.values(), default=0) >= 0:
-            most = max(most, count)
+            most = max(most, len(case.plan) - len(left))
     return most
 
 
 @each_setting
 @given(case=cases())
 def test_blocks_lost_are_what_each_kinder_reading_of_the_plan_wins(setting, case):
-    counted = outcomes(case, setting)
-    assert tuple(sorted(counted)) == tuple(sorted(BLOCK_OUTCOMES))
+    counted, n = outcomes(case, setting), len(case.scene)
+    assert {*counted} == {*scoring.BLOCK_OUTCOMES}
     assert min(counted.values()) >= 0
-    n, steps = len(case.scene), len(case.plan)
     assert sum(counted.values()) == n
-    goals = {name: goal_of(case, name) for name in SETTINGS}
-    named = {name: level1_counts(goal, case.plan, "selection").tp for name, goal in goals.items()}
-    assert counted["left_out"] == n - min(n, steps)
+    named = {name: level1(case, name, "selection").tp for name in SETTINGS}
+    assert counted["left_out"] == n - min(n, len(case.plan))
     assert counted["left_out"] + counted["wrong_kind"] == n - named["B"]
     assert counted["wrong_orientation"] == named["B"] - named[setting]
     assert counted["order"] + counted["placed"] == standing(case, setting, Counter())
@@ -257,11 +212,11 @@ def test_missing_supports_have_the_cause_that_would_mend_them(setting, case):
 @st.composite
 def distinct_cases(draw):
     """Goals of blocks of which no two are of a kind; each can be named as it is, or turned."""
-    edges = draw(acyclic(5).filter(bool))
-    kinds = [(shape, color) for shape in ("arch", "cuboid3") for color in ("red", "blue", "green")]
+    edges = draw(made.acyclic(5).filter(bool))
+    kinds = [*product(("arch", "cuboid3"), ("red", "blue", "green"))]
     blocks = tuple(
-        Block(v + 1, *kinds[v], FLAT, FLAT, tuple(sorted(w + 1 for w in needed)), 1)
-        for v, needed in enumerate(edges)
+        made.block(v, (*kinds[v - 1], FLAT), (w + 1 for w in needed))
+        for v, needed in enumerate(edges, 1)
     )
     poses = [Candidate(*kind, pose) for kind in kinds for pose in (FLAT, TURNED)]
     steps = draw(st.lists(st.integers(1, len(poses)), max_size=8))
@@ -304,28 +259,24 @@ def test_where_no_two_blocks_are_of_a_kind_each_has_the_outcome_that_its_own_sto
 def test_every_valid_order_scores_1_and_places_all_and_an_empty_plan_leaves_all_out(
     setting, case, seed
 ):
-    scene = case.scene
+    scene, n = case.scene, len(case.scene)
     candidates = CandidateSet(tuple({block.look: block for block in scene.blocks}.values()))
     order = scene.graph.random_order(np.random.default_rng(seed))
     steps = tuple(candidates.index_of(scene.blocks[vertex].look) for vertex in order)
-    right = Case(scene, candidates, Plan(steps))
-    counts = matched(right, setting).counts
-    assert (counts.fp, counts.fn, counts.f1) == (0, 0, 1)
-    assert +Counter(outcomes(right, setting)) == {"placed": len(scene)}
-    assert kept(right, setting) == len(scene)
-    empty = Case(scene, candidates, Plan())
-    assert +Counter(outcomes(empty, setting)) == {"left_out": len(scene)}
-    assert kept(empty, setting) == 0
+    for plan, right, outcome in ((Plan(steps), n, "placed"), (Plan(), 0, "left_out")):
+        one = Case(scene, candidates, plan)
+        assert matched(one, setting).counts == Counts(right, 0, n - right)
+        assert +Counter(outcomes(one, setting)) == {outcome: n}
+        assert kept(one, setting) == right
 
 
 @each_setting
 @given(case=cases(max_blocks=7, max_steps=10) | carriers(), data=st.data())
 def test_file_order_and_numbering_change_no_type_and_no_outcome(setting, case, data):
-    shuffled = renumbered(case, data)
-    errors = [Counter(matched(one, setting).errors) for one in (shuffled, case)]
-    assert errors[0] == errors[1]
-    assert outcomes(shuffled, setting) == outcomes(case, setting)
-    assert kept(shuffled, setting) == kept(case, setting)
+    def told(one):
+        return Counter(matched(one, setting).errors), outcomes(one, setting), kept(one, setting)
+
+    assert told(made.renumbered(case, data)) == told(case)
 
 
 def common(plan, case, order, setting):
@@ -347,18 +298,21 @@ def test_steps_kept_are_those_common_with_the_nearest_of_all_valid_orders(settin
     most = max(common(case.plan.steps, case, order, setting) for order in orders)
     assert kept(case, setting) == most
     placed, goal = matched(case, setting).counts.tp, goal_of(case, setting)
-    assert placed <= most == steps_kept(goal, case.plan, placed)
-    assert most <= level1_counts(goal, case.plan, "selection").tp
+    assert placed <= most == scoring.steps_kept(goal, case.plan, placed)
+    assert most <= level1(case, setting, "selection").tp
 
 
-def test_a_step_that_is_no_candidate_is_refused():
-    scene = Scene("s", (3,), (Block(1, "arch", "red", FLAT, FLAT, (), 1),), ("s",))
-    goal, plan = Goal(scene, CandidateSet((Candidate("arch", "red", FLAT),)), "A"), Plan((1, 2))
-    for ask in (
-        lambda: block_outcomes(goal, plan, [0]),
-        lambda: steps_kept(goal, plan),
-        *(lambda matcher=matcher: match_plan(goal, plan, matcher) for matcher in MATCHERS),
-        *(lambda name=name: level1_counts(goal, plan, name) for name in LEVEL1_CRITERIA),
-    ):
-        with pytest.raises(KeyError):
-            ask()
+@pytest.mark.parametrize(
+    ("ask", "more"),
+    [
+        (scoring.block_outcomes, [[0]]),
+        (scoring.steps_kept, []),
+        *((match_plan, [matcher]) for matcher in MATCHERS),
+        *((scoring.level1_counts, [criterion]) for criterion in LEVEL1_CRITERIA),
+    ],
+)
+def test_a_step_that_is_no_candidate_is_refused(ask, more):
+    look = ("arch", "red", FLAT)
+    scene = Scene("s", (3,), (made.block(1, look),), ("s",))
+    with pytest.raises(KeyError):
+        ask(Goal(scene, CandidateSet((Candidate(*look),)), "A"), Plan((1, 2)), *more)

@@ -8,18 +8,17 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.optimize import linear_sum_assignment
-from scipy.spatial.transform import Rotation
 
 from phyblock.domain.blocks import BLOCK_TYPES, SHAPES, euler_deg_to_matrix, symmetries, turn_deg
-from phyblock.domain.scene import Block, Candidate, CandidateSet, Plan, Scene, angles_deg
+from phyblock.domain.scene import Candidate, CandidateSet, Plan, Scene, angles_deg
 from phyblock.scoring.plan import Goal, most_placed
 from phyblock.scoring.pose import Motion, Nearness, PoseScorer, cheapest, matched, overlap_volume
 from phyblock.sim.contact import pieces_of
-from phyblock.sim.engine import quat_xyzw_to_euler_deg
 from tests.scoring.cases import cases
 from tests.sim.structures import block
 
 KINDS = ("cube", "cuboid2", "triangle", "arch")
+FLAT = (0.0, 0.0, 0.0)
 
 
 @st.composite
@@ -34,11 +33,10 @@ def scenes(draw):
         place = (draw(grid), draw(grid), draw(st.integers(0, 5)) * 0.025)
         below = draw(st.sets(st.integers(1, n), max_size=2))
         depend = tuple(sorted(o for o in below if o < order))
-        blocks.append(Block(order, kind, "red", place, (0.0, 0.0, 90.0 * turn), depend, 1))
-    looks = {block.look: block for block in blocks}
-    candidates = [Candidate(b.type, b.color, b.euler_deg) for b in looks.values()]
-    candidates.append(Candidate("cylinder", "red", (0.0, 0.0, 0.0)))
-    return Scene("s", (2,), tuple(blocks), ("s",)), CandidateSet(tuple(candidates))
+        blocks.append(block(order, kind, place, (0.0, 0.0, 90.0 * turn), depend=depend))
+    looks = {one.look: one for one in (*blocks, block(7, "cylinder", FLAT))}
+    candidates = tuple(Candidate(*one.kind, one.euler_deg) for one in looks.values())
+    return Scene("s", (2,), tuple(blocks), ("s",)), CandidateSet(candidates)
 
 
 def scored(scene, candidates, steps, named=None):
@@ -52,17 +50,13 @@ def laid(scene, order):
 
 
 def noisy(steps, rng, sigma_m):
-    def off(step):
-        x, y, z = np.array(step.position_m) + rng.normal(0, sigma_m, 3)
-        return (float(x), float(y), float(z))
-
-    return [replace(step, position_m=off(step)) for step in steps]
+    places = (step.position_m + rng.normal(0, sigma_m, 3) for step in steps)
+    return [replace(a, position_m=tuple(b.tolist())) for a, b in zip(steps, places, strict=True)]
 
 
 def turned(step, angle_deg, shift_m):
     """Only the place is turned: candidates keep how they were shown."""
-    matrix = euler_deg_to_matrix((0.0, 0.0, angle_deg))
-    x, y, z = matrix @ np.array(step.position_m)
+    x, y, z = euler_deg_to_matrix((0.0, 0.0, angle_deg)) @ step.position_m
     return replace(step, position_m=(x + shift_m[0], y + shift_m[1], z))
 
 
@@ -91,9 +85,8 @@ def test_no_more_steps_are_right_than_without_poses_and_wider_tolerances_lose_no
     scene, candidates = drawn
     vertices = data.draw(st.lists(st.integers(0, len(scene) - 1), max_size=7))
     steps = noisy(laid(scene, vertices), np.random.default_rng(seed), sigma_m)
-    goal = Goal(scene, candidates, "A")
     numbers = tuple(candidates.index_of(step.look) for step in steps)
-    most = most_placed(goal, Plan(numbers))
+    most = most_placed(Goal(scene, candidates, "A"), Plan(numbers))
     for score in scored(scene, candidates, steps):
         assert sum(fit is not None for fit in score.fits) == most
         assert list(score.right) == sorted(score.right)
@@ -138,12 +131,8 @@ def test_the_best_motion_of_a_plan_is_no_worse_than_none(drawn, random, sigma_m)
         assert aligned.right == absolute.right
 
 
-FLAT = (0.0, 0.0, 0.0)
-TWO = tuple(Block(n, "cube", "red", (0.0, 0.025 * (n - 1), 0.0), FLAT, (), 1) for n in (1, 2))
-HALF_TURN = (
-    Scene("s", (2,), (TWO[0], replace(TWO[1], depend=(1,))), ("s",)),
-    CandidateSet((Candidate("cube", "red", FLAT),)),
-)
+TWO = (block(1, "cube", FLAT), block(2, "cube", (0.0, 0.025, 0.0), depend=(1,)))
+HALF_TURN = Scene("s", (2,), TWO, ("s",)), CandidateSet((Candidate("cube", "red", FLAT),))
 """A goal that looks the same after half a turn, which only one order of its blocks may make."""
 
 
@@ -160,12 +149,10 @@ def test_symmetries_and_the_order_of_equal_blocks_in_the_file_change_nothing(dra
     for step in steps:
         alike = symmetries(step.type)
         turn = euler_deg_to_matrix(step.euler_deg) @ alike[int(rng.integers(len(alike)))]
-        other.append(
-            replace(step, euler_deg=quat_xyzw_to_euler_deg(Rotation.from_matrix(turn).as_quat()))
-        )
+        other.append(replace(step, euler_deg=angles_deg(turn)))
     one = scored(scene, candidates, steps)
     for order in (rng.permutation(len(scene)), range(len(scene))[::-1]):
-        shuffled = replace(scene, blocks=tuple(scene.blocks[vertex] for vertex in order))
+        shuffled = replace(scene, blocks=tuple(laid(scene, order)))
         two = scored(shuffled, candidates, other, steps)
         assert [summary(score) for score in one] == [summary(score) for score in two]
 
@@ -181,7 +168,6 @@ def test_assignments_are_as_cheap_as_those_of_scipy(rows, columns, seed):
 @settings(max_examples=60)
 @given(cases(max_blocks=5, max_steps=6).filter(lambda case: case.plan.steps), st.integers(0, 9999))
 def test_steps_are_matched_at_the_least_cost_of_all_valid_ways(case, seed):
-    """Against every way there is."""
     scene, numbers = case.scene, case.plan.steps
     goal = Goal(scene, case.candidates, "A")
     equal = np.array([[v in goal.equal_to[n] for v in range(len(scene))] for n in numbers])
@@ -224,18 +210,17 @@ def test_shared_volumes_agree_with_points_drawn_at_random(one, other, seed):
     turn, place = rng.uniform(-180, 180, 3), rng.uniform(-0.03, 0.03, 3)
     first, second = block(1, one, FLAT), block(2, other, tuple(place), tuple(turn))
     low, high = np.array(SHAPES[one].low_m), np.array(SHAPES[one].high_m)
-    points = rng.uniform(low, high, (20_000, 3))
-    both = _inside(points, first) & _inside(points, second)
-    drawn = both.mean() * float(np.prod(high - low))
-    found = overlap_volume(first, second)
-    assert found == pytest.approx(drawn, abs=0.02 * float(np.prod(high - low)))
-    assert found == pytest.approx(overlap_volume(second, first), abs=1e-12)
+    points, box_m3 = rng.uniform(low, high, (20_000, 3)), float(np.prod(high - low))
 
+    def are_in(solid):
+        found = np.zeros(len(points), dtype=bool)
+        for piece in pieces_of(solid):
+            spans = piece.vertices_m @ piece.face_normals.T
+            heights = points @ piece.face_normals.T
+            found |= ((heights >= spans.min(axis=0)) & (heights <= spans.max(axis=0))).all(axis=1)
+        return found
 
-def _inside(points, solid):
-    found = np.zeros(len(points), dtype=bool)
-    for piece in pieces_of(solid):
-        spans = piece.vertices_m @ piece.face_normals.T
-        heights = points @ piece.face_normals.T
-        found |= ((heights >= spans.min(axis=0)) & (heights <= spans.max(axis=0))).all(axis=1)
-    return found
+    drawn_m3 = (are_in(first) & are_in(second)).mean() * box_m3
+    found_m3 = overlap_volume(first, second)
+    assert found_m3 == pytest.approx(drawn_m3, abs=0.02 * box_m3)
+    assert found_m3 == pytest.approx(overlap_volume(second, first), abs=1e-12)

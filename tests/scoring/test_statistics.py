@@ -28,6 +28,10 @@ def ends(found):
     return float(found.lo), float(found.hi)
 
 
+def jackknife_of_mean(x):
+    return statistics.jackknife(np.stack([x, np.ones(len(x))], 1), alone(len(x)), mean_of)
+
+
 def mean_of(sums):
     return np.asarray(sums[..., 0] / sums[..., 1])
 
@@ -43,17 +47,14 @@ def test_the_variance_sums_over_all_pairs_that_have_a_base_scene_in_common(paren
     clusters = statistics.Clusters.of(parents)
     in_common = [[bool(set(a) & set(b)) for b in parents] for a in parents]
     variance = max(float(x @ np.array(in_common) @ x), float(x @ x))
-    found = statistics.jackknife(x[:, None], clusters, lambda sums: sums[..., 0])
-    n = clusters.size
-    if n < 2:
-        assert np.isnan(found.se)
-    else:
-        assert found.se == pytest.approx(np.sqrt(variance * (n - 1) / n))
+    found, n = statistics.jackknife(x[:, None], clusters, lambda sums: sums[..., 0]), clusters.size
+    wanted = np.nan if n < 2 else np.sqrt(variance * (n - 1) / n)
+    assert found.se == pytest.approx(wanted, nan_ok=True)
 
 
 @given(hnp.arrays(float, st.integers(2, 30), elements=st.floats(-1e3, 1e3, width=32)))
 def test_a_mean_of_lone_units_has_students_interval(x):
-    found = statistics.jackknife(np.stack([x, np.ones(len(x))], 1), alone(len(x)), mean_of)
+    found = jackknife_of_mean(x)
     se = x.std(ddof=1) / np.sqrt(len(x))
     assert found.se == pytest.approx(se, abs=1e-9)
     wanted = x.mean() + stats.t.ppf([0.025, 0.975], len(x) - 1) * se
@@ -63,10 +64,9 @@ def test_a_mean_of_lone_units_has_students_interval(x):
 @given(hnp.arrays(np.int64, (6, 3), elements=st.integers(0, 9)), st.integers(2, 5))
 def test_counts_a_whole_number_of_times_as_large_change_nothing(counts, times):
     for metric in (ratio_of, f1_of):
-        once, often = (statistics.jackknife(counts * k, alone(6), metric) for k in (1, times))
-        for name in ("value", "se", "lo", "hi", "p"):
-            a, b = getattr(once, name), getattr(often, name)
-            assert np.allclose(a, b, equal_nan=True)
+        both = [statistics.jackknife(counts * k, alone(6), metric) for k in (1, times)]
+        once, often = ([one.value, one.se, one.lo, one.hi, one.p] for one in both)
+        assert np.allclose(once, often, equal_nan=True)
 
 
 @given(hnp.arrays(np.int64, (8, 3), elements=st.integers(0, 9)))
@@ -91,10 +91,10 @@ def test_none_of_n_and_all_of_n_have_wilsons_interval(n, is_right):
 def test_scenes_that_agree_leave_a_share_in_doubt(part, whole, n, k):
     """As much as if each were one sample, also where scenes of several counts have the same."""
     counts = np.array([[part, whole]] * n)
-    found = statistics.in_range(
-        statistics.jackknife(counts * np.arange(1, n + 1)[:, None] ** k, alone(n), ratio_of)
+    found, same = (
+        statistics.in_range(statistics.jackknife(some, alone(n), ratio_of))
+        for some in (counts * np.arange(1, n + 1)[:, None] ** k, counts)
     )
-    same = statistics.in_range(statistics.jackknife(counts, alone(n), ratio_of))
     assert 0 < found.lo < found.value < found.hi < 1
     assert ends(found) == pytest.approx(ends(same))
     p, z = part / whole, stats.t.ppf(0.975, n - 1)
@@ -107,20 +107,18 @@ def test_scenes_that_agree_leave_a_share_in_doubt(part, whole, n, k):
     st.sampled_from([180.0, 400.0, np.inf]),
 )
 def test_an_interval_stays_in_the_range_of_its_measure(x, most):
-    student = statistics.jackknife(np.stack([x, np.ones(len(x))], 1), alone(len(x)), mean_of)
+    student = jackknife_of_mean(x)
     found, without = statistics.in_range(student, most), statistics.in_range(student, np.nan)
     assert (without.lo, without.hi) == (student.lo, student.hi)
     assert 0 <= found.lo <= found.value <= found.hi <= most
     if found.se > 1e-6 * found.value:
         assert found.lo < found.value < found.hi
     if most < np.inf:
-        shares = np.stack([x / most, np.ones(len(x))], 1)
-        as_share = statistics.in_range(statistics.jackknife(shares, alone(len(x)), mean_of))
+        as_share = statistics.in_range(jackknife_of_mean(x / most))
         assert ends(found) == pytest.approx(tuple(most * end for end in ends(as_share)))
-        return
-    # A range without end is the limit of one whose end is far away.
-    far = statistics.in_range(student, 1e9)
-    if found.se > 1e-3 * found.value:
+    elif found.se > 1e-3 * found.value:
+        # A range without end is the limit of one whose end is far away.
+        far = statistics.in_range(student, 1e9)
         assert ends(found) == pytest.approx(ends(far), rel=1e-3, abs=1e-6)
 
 
@@ -142,10 +140,9 @@ def test_a_few_scenes_that_agree_leave_as_much_doubt_as_a_sign_test(n):
 
 @given(st.floats(0.001, 10), st.integers(5, 200), st.sampled_from([0.05, 0.01, 0.001]))
 def test_what_is_detectable_is_found_in_four_of_five_cases(se, n, level):
-    df = n - 1
-    effect = float(statistics.detectable(se, n, level))
     # The estimate, less the effect, over its standard error, is Student's t.
-    found = stats.t.sf(stats.t.isf(level / 2, df) - effect / se, df)
+    student, effect = stats.t(n - 1), float(statistics.detectable(se, n, level))
+    found = student.sf(student.isf(level / 2) - effect / se)
     assert found == pytest.approx(statistics.POWER, abs=1e-6)
 
 
@@ -213,51 +210,35 @@ def test_intervals_hold_the_truth_and_tests_err_as_often_as_they_say(world):
     assert 0.03 <= erred / n <= 0.07
 
 
-ITEMS, LEVELS, BLOCKS = 40, 2, 16
-TRUTH = {"shift": 0.04, "interaction": 0.08, "within": 0.1, "spread": 0.3}
-RUNS = 150
-
-
-def drawn(seed, items=12):
-    return np.random.default_rng(seed).normal(size=(items, 3, 4))
-
-
-def close(one, other, scale=1.0):
-    a, b = ([part.sd, part.lo, part.hi] for part in (one, other))
-    return np.allclose(np.array(a) * scale, b, rtol=1e-6, atol=1e-7)
+def drawn(seed):
+    return rng(seed).normal(size=(12, 3, 4))
 
 
 @given(seed=st.integers(0, 10**6))
 def test_what_belongs_to_items_and_blocks_is_no_work_of_levels(seed):
-    scores, rng = drawn(seed), np.random.default_rng(seed + 1)
-    other = scores + rng.normal(size=(12, 1, 1)) + rng.normal(size=(1, 1, 4))
-    assert close(statistics.shift(scores, alone(12)), statistics.shift(other, alone(12)))
-    assert close(
-        statistics.shift(scores, alone(12)), statistics.shift(100 * scores, alone(12)), 100
-    )
-
-
-@given(seed=st.integers(0, 10**6))
-def test_an_effect_alike_on_all_items_is_shift(seed):
-    scores = drawn(seed)
+    """An effect alike on all items is."""
+    scores, draw = drawn(seed), rng(seed + 1)
+    other = scores + draw.normal(size=(12, 1, 1)) + draw.normal(size=(1, 1, 4))
     moved = scores + np.array([0.0, 5.0, -1.0])[None, :, None]
-    assert statistics.shift(moved, alone(12)).sd > statistics.shift(scores, alone(12)).sd
+    parts = (statistics.shift(one, alone(12)) for one in (scores, other, 100 * scores, moved))
+    plain, same, scaled, more = (np.array([part.sd, part.lo, part.hi]) for part in parts)
+    np.testing.assert_allclose([same, scaled / 100], [plain, plain], rtol=1e-6, atol=1e-7)
+    assert more[0] > plain[0]
 
 
 def test_a_known_shift_lies_in_its_interval():
-    rng = np.random.default_rng(2)
+    draw, (items, runs), shift = rng(2), (40, 150), 0.04
     hits, square = 0, 0.0
-    for _ in range(RUNS):
-        y = rng.normal(0, TRUTH["spread"], (ITEMS, 1, 1))
-        y = y + np.array([-1, 1])[None, :, None] * TRUTH["shift"] / np.sqrt(2)
-        y = y + rng.normal(0, TRUTH["interaction"], (ITEMS, LEVELS, 1))
-        y = y + rng.normal(0, TRUTH["within"], (ITEMS, LEVELS, BLOCKS))
-        part = statistics.shift(y, alone(ITEMS))
-        hits += part.lo <= TRUTH["shift"] <= part.hi
-        square += part.sd**2 / RUNS
+    for _ in range(runs):
+        y = draw.normal(0, 0.3, (items, 1, 1))
+        y = y + np.array([-1, 1])[None, :, None] * shift / np.sqrt(2)
+        y = y + draw.normal(0, 0.08, (items, 2, 1)) + draw.normal(0, 0.1, (items, 2, 16))
+        part = statistics.shift(y, alone(items))
+        hits += part.lo <= shift <= part.hi
+        square += part.sd**2 / runs
     # Three standard errors of a share of 0.95 in so many runs, and of its mean.
-    assert hits / RUNS > 0.89
-    assert np.sqrt(square) == pytest.approx(TRUTH["shift"], rel=0.15)
+    assert hits / runs > 0.89
+    assert np.sqrt(square) == pytest.approx(shift, rel=0.15)
 
 
 def test_nothing_to_tell_has_no_value():

@@ -1,13 +1,12 @@
 """Blocks and small structures that tests look at closely."""
 
-import math
 from dataclasses import replace
 
 import numpy as np
 from hypothesis import strategies as st
 
-from phyblock.domain.blocks import BLOCK_TYPES, BlockType, Color, Euler
-from phyblock.domain.scene import Block, Scene
+from phyblock.domain.blocks import BLOCK_TYPES, BlockType, Color, Euler, euler_deg_to_matrix
+from phyblock.domain.scene import Block
 from phyblock.making.scenes.sketch import Draft
 
 
@@ -29,8 +28,10 @@ def block(
     position_m: tuple[float, float, float],
     euler_deg: Euler = (0.0, 0.0, 0.0),
     color: Color = "red",
+    depend: tuple[int, ...] = (),
 ) -> Block:
-    return Block(order, block_type, color, position_m, euler_deg, (), 1)
+    """A block, in the second layer if it depends on others."""
+    return Block(order, block_type, color, position_m, euler_deg, depend, 1 + bool(depend))
 
 
 def tower(height: int) -> list[Block]:
@@ -50,25 +51,22 @@ def counterweighted_beam() -> list[Block]:
 
 def turned(blocks: list[Block], angle_deg: float, shift_m: tuple[float, float]) -> list[Block]:
     """The structure turned about the vertical and then moved on the ground."""
-    cosine, sine = math.cos(math.radians(angle_deg)), math.sin(math.radians(angle_deg))
+    matrix = euler_deg_to_matrix((0.0, 0.0, angle_deg))
     moved = []
     for one in blocks:
-        x, y, z = one.position_m
+        x, y, z = (matrix @ one.position_m + [*shift_m, 0.0]).tolist()
         roll, pitch, yaw = one.euler_deg
-        place = (cosine * x - sine * y + shift_m[0], sine * x + cosine * y + shift_m[1], z)
-        moved.append(replace(one, position_m=place, euler_deg=(roll, pitch, yaw + angle_deg)))
+        moved.append(replace(one, position_m=(x, y, z), euler_deg=(roll, pitch, yaw + angle_deg)))
     return moved
 
 
 @st.composite
-def clouds(draw: st.DrawFn) -> list[Block]:
-    """One to six blocks anywhere over a square meter, in any orientation."""
-    reach = st.floats(-0.5, 0.5)
+def clouds(draw: st.DrawFn, reach_m: float = 0.5, least: int = 1) -> list[Block]:
+    """At most six blocks anywhere within a cube over the ground, in any orientation."""
+    at = st.floats(-reach_m, reach_m)
     return [
-        block(i + 1, draw(block_types), (draw(reach), draw(reach), draw(reach) + 0.6), draw(eulers))
-        for i in range(draw(st.integers(1, 6)))
+        block(
+            i + 1, draw(block_types), (draw(at), draw(at), draw(at) + reach_m + 0.1), draw(eulers)
+        )
+        for i in range(draw(st.integers(least, 6)))
     ]
-
-
-def scene_of(blocks: list[Block], name: str = "test") -> Scene:
-    return Scene(name, (3,), tuple(blocks), (name,))

@@ -13,15 +13,7 @@ from hypothesis import strategies as st
 from phyblock.making.scenes.sketch import POSES
 from phyblock.sim import dynamics
 from phyblock.sim.contact import drop_height_m
-from phyblock.sim.dynamics import (
-    DEFAULT_TRIAL,
-    ONE_SETTING,
-    after_removal,
-    check,
-    check_steps,
-    holds,
-    settle,
-)
+from phyblock.sim.dynamics import DEFAULT_TRIAL, ONE_SETTING, check, check_steps, settle
 from phyblock.sim.engine import Pose, open_world
 from tests.shipped import TASKS
 from tests.sim.structures import block, built, counterweighted_beam, tower
@@ -68,11 +60,9 @@ def test_execution_depends_on_no_process_and_no_processor_and_loads_engines_late
     """OpenBLAS adds up in another order, and without fused operations, for an old processor."""
 
     def printed(**more):
-        command, env = [sys.executable, "-c", SHAKEN], {**os.environ, **more}
-        root = Path(__file__).parents[2]
-        done = subprocess.run(
-            command, cwd=root, env=env, capture_output=True, text=True, check=True
-        )
+        command, root = [sys.executable, "-c", SHAKEN], Path(__file__).parents[2]
+        env = os.environ | more
+        done = subprocess.run(command, cwd=root, env=env, capture_output=True, check=True)
         assert not done.stderr
         return done.stdout
 
@@ -101,9 +91,8 @@ def test_no_verdict_depends_on_a_place(x_m, y_m):
         for one in WHEELS
         for x, y, z in [one.position_m]
     ]
-    assert check_steps(moved, FIRST) == check_steps(WHEELS, FIRST)
-    assert check(moved, FIRST) == check(WHEELS, FIRST)
-    assert settle(moved, FIRST).fallen == settle(WHEELS, FIRST).fallen
+    for verdict in (check_steps, check, lambda *one: settle(*one).fallen):
+        assert verdict(moved, FIRST) == verdict(WHEELS, FIRST)
 
 
 @pytest.mark.parametrize("trial", [ONE_SETTING, DEFAULT_TRIAL], ids=["one", "default"])
@@ -128,17 +117,17 @@ def test_the_same_falls_whatever_was_tried_before(trial):
 
 def test_what_rests_on_a_removed_block_moves_and_nothing_else():
     three = (*tower(2), block(3, "cube", (0.1, 0.0, 0.025)))
-    outcome = after_removal(three, 1)
-    assert outcome.is_clear
-    assert outcome.moved == (2,)
-    assert outcome == after_removal(three, 1)
-    fallen = next(block for block in outcome.settled if block.order == 2)
-    assert abs(fallen.position_m[2] - 0.025) < 0.002
-    alone = after_removal(three, 3)
+    outcome = dynamics.after_removal(three, 1)
+    assert (outcome.is_clear, outcome.moved) == (True, (2,))
+    assert outcome == dynamics.after_removal(three, 1)
+    (height_m,) = (one.position_m[2] for one in outcome.settled if one.order == 2)
+    assert height_m == pytest.approx(0.025, abs=0.002)
+    alone = dynamics.after_removal(three, 3)
     assert (alone.moved, alone.settled) == ((), three[:2])
 
 
 @pytest.mark.parametrize(("over_m", "verdict"), [(0.025, None), (0.035, False), (0.015, True)])
 def test_weight_just_over_an_edge_is_not_clear(over_m, verdict):
     """A cube half of which hangs over falls in every level world, and stays on many a table."""
-    assert holds((tower(1)[0], block(2, "cube", (over_m, 0.0, 0.075))), 2) is verdict
+    pair = (*tower(1), block(2, "cube", (over_m, 0.0, 0.075)))
+    assert dynamics.holds(pair, 2) is verdict

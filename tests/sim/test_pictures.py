@@ -1,6 +1,5 @@
 """Pictures: cameras that cut nothing off, blocks that stand out, the same bytes for one recipe."""
 
-import hashlib
 import io
 import itertools
 from dataclasses import replace
@@ -19,26 +18,16 @@ from phyblock.errors import DataError
 from phyblock.making.scenes.candidates import make_candidates
 from phyblock.making.scenes.sketch import POSES
 from phyblock.sim import pictures
+from phyblock.sim import question_pictures as asked
 from phyblock.sim.backgrounds import GROUNDS
 from phyblock.sim.engine import Pose, quat_xyzw_to_euler_deg
-from phyblock.sim.pictures import assembly_gif, kit_key, ruled_key
-from phyblock.sim.question_pictures import (
-    block_mark,
-    drawn_blocks,
-    is_inside,
-    question_camera,
-    question_key,
-    question_png,
-    seen,
-    seen_order,
-    state_picture,
-)
+from phyblock.sim.question_pictures import question_key, question_png, seen
 from phyblock.sim.raster import Window, frame, view_axes
 from phyblock.types import BACKGROUNDS
 from tests.shipped import TASKS
-from tests.sim.structures import block, clouds, scene_of, tower
+from tests.sim.structures import block, clouds, tower
 
-TASK = TASKS[0]
+SCENE = TASKS[0].scene
 STYLE, SMALL = pictures.PictureStyle(), pictures.PictureStyle(size_px=128)
 MARGIN, LEAST_CONTRAST = 0.16, 3.0
 EVERY_LOOK = [
@@ -67,9 +56,7 @@ def pixels(png):
 
 @given(angles, elevations)
 def test_axes_are_a_right_handed_frame(azimuth_deg, elevation_deg):
-    """But for their rounding to 12 decimals."""
-    axes = view_axes(azimuth_deg, elevation_deg)
-    right, up, forward = axes
+    right, up, forward = axes = view_axes(azimuth_deg, elevation_deg)
     assert_allclose(axes @ axes.T, np.eye(3), atol=1e-11)
     assert_allclose(np.cross(right, up), -forward, atol=1e-11)
     assert up[2] >= -1e-12
@@ -129,7 +116,7 @@ def test_all_candidates_of_a_grid_have_one_scale_and_the_largest_fills_its_cell(
 def test_every_look_has_a_picture_of_its_own_that_fills_its_cell_above_the_number():
     found = {}
     for candidate in EVERY_LOOK:
-        one = pictures.on_the_floor(candidate.type, candidate.color, candidate.euler_deg)
+        one = pictures.on_the_floor(*candidate.kind, candidate.euler_deg)
         camera = pictures.candidate_camera(one, STYLE)
         rows, columns = np.nonzero(pictures.shoot([one], camera, 128).block >= 0)
         assert 0.04 * 128 < rows.min() <= rows.max() < 128 * (1 - pictures.LABEL_STRIP)
@@ -158,9 +145,8 @@ def test_every_face_stands_out_from_the_floor(background, color):
     """
     one, size_px = pictures.on_the_floor("cube", color, (0.0, 0.0, 0.0)), 256
     camera = pictures.camera_for([one], STYLE, "cube")
-    light = luminance(
-        np.asarray(pictures.picture([one], camera, background, size_px), dtype=np.float64)
-    )
+    picture = pictures.picture([one], camera, background, size_px)
+    light = luminance(np.asarray(picture, dtype=np.float64))
     inside = np.pad(pictures.segments([one], camera, size_px) >= 0, 4)
     rows, columns = np.nonzero(inside & ~np.roll(inside, 1, 1) | inside & ~np.roll(inside, -1, 1))
     clear = []
@@ -191,19 +177,21 @@ def test_keys_differ_exactly_where_pixels_may():
         *(pictures.goal_key(one, SMALL) for one in (scene, other, turned)),
         *(pictures.goal_key(scene, replace(SMALL, **change)) for change in looks),
         *(pictures.candidates_key(make_candidates(one), SMALL) for one in (scene, other)),
-        *(ruled_key(one, SMALL) for one in (scene, other)),
-        *(kit_key(one, SMALL) for one in (kit, CandidateSet(kit.candidates[:-1]))),
+        *(pictures.ruled_key(one, SMALL) for one in (scene, other)),
+        *(pictures.kit_key(one, SMALL) for one in (kit, CandidateSet(kit.candidates[:-1]))),
         *(question_key(one, STYLE) for one in recipes),
         question_key(PLAIN, replace(STYLE, size_px=256)),
     ]
     assert len({*keys}) == len(keys)
-    assert {len(key) for key in keys} == {hashlib.sha256().digest_size * 2}
+    assert {len(key) for key in keys} == {64}
     assert pictures.goal_key(replace(scene, id="another", levels=(4,)), SMALL) == keys[0]
-    plain = question_key(PLAIN, STYLE)
-    assert question_key(replace(PLAIN, label="A"), STYLE) == plain
-    assert question_key(PLAIN, replace(STYLE, azimuth_deg=200.0)) == plain
     high, low = (QuestionPicture("block", (one,), VIEW) for one in (TOWER[1], TOWER[0]))
-    assert question_key(high, STYLE) == question_key(low, STYLE)
+    for one, same, style in (
+        (PLAIN, replace(PLAIN, label="A"), STYLE),
+        (PLAIN, PLAIN, replace(STYLE, azimuth_deg=200.0)),
+        (high, low, STYLE),
+    ):
+        assert question_key(one, STYLE) == question_key(same, style)
 
 
 @given(angles, st.floats(-85, 85), angles)
@@ -219,16 +207,13 @@ def test_no_picture_is_cut_off_or_open_whatever_it_frames(blocks, framed, azimut
     """Not even where blocks lie behind the place from which those in the frame are seen best."""
     style = pictures.PictureStyle(azimuth_deg=azimuth, elevation_deg=elevation)
     corners = np.vstack([pictures.drawn_m(one) for one in blocks])
-    assert (
-        np.abs(pictures.goal_camera(scene_of(blocks), style).project(corners)).max()
-        <= 1 - MARGIN + 1e-9
-    )
-    assert is_inside(QuestionPicture("s", tuple(blocks), (azimuth, elevation)))
-    recipe = QuestionPicture(
-        "s", tuple(blocks), (azimuth, elevation), framed=tuple(blocks[:framed])
-    )
-    camera = question_camera(recipe, STYLE)
-    drawn = np.vstack([pictures.drawn_m(one) for one in drawn_blocks(recipe)])
+    camera = pictures.goal_camera(Scene("s", (3,), tuple(blocks), ("s",)), style)
+    assert np.abs(camera.project(corners)).max() <= 1 - MARGIN + 1e-9
+    recipe = QuestionPicture("s", tuple(blocks), (azimuth, elevation))
+    assert asked.is_inside(recipe)
+    recipe = replace(recipe, framed=tuple(blocks[:framed]))
+    camera = asked.question_camera(recipe, STYLE)
+    drawn = np.vstack([pictures.drawn_m(one) for one in asked.drawn_blocks(recipe)])
     depths = (drawn - camera.eye_m) @ camera.axes[2]
     assert 0 < camera.near_m < depths.min() <= depths.max() < camera.far_m
 
@@ -237,17 +222,14 @@ def test_marks_show_on_the_blocks_that_they_are_on():
     marked, plain = (pixels(question_png(one, STYLE)) for one in (MARKED, PLAIN))
     assert 1000 < (np.abs(marked - plain).max(axis=2) > 60).sum() < 12000
     for one in TOWER:
-        mark = block_mark(PLAIN, seen(PLAIN), one.order, "A")
-        assert seen_order(PLAIN, seen(PLAIN), mark.position_m) == one.order
+        mark = asked.block_mark(PLAIN, seen(PLAIN), one.order, "A")
+        assert asked.seen_order(PLAIN, seen(PLAIN), mark.position_m) == one.order
 
 
 def test_a_state_is_seen_as_the_goal_is_and_changes_where_a_block_comes():
-    scene = TASK.scene
-    states = [
-        question_png(state_picture(scene, scene.blocks[:count], SMALL), SMALL)
-        for count in range(len(scene) + 1)
-    ]
-    assert states[-1] == pictures.goal_png(scene, SMALL)
+    built = (SCENE.blocks[:count] for count in range(len(SCENE) + 1))
+    states = [question_png(asked.state_picture(SCENE, one, SMALL), SMALL) for one in built]
+    assert states[-1] == pictures.goal_png(SCENE, SMALL)
     for before, after in itertools.pairwise(map(pixels, states)):
         assert 0 < (before != after).any(axis=2).mean() < 0.5
 
@@ -272,17 +254,14 @@ def test_all_that_is_ruled_and_written_is_in_the_picture(places, azimuth_deg, el
         assert low <= points[:, axis].min() - 3 + 1e-6
         assert points[:, axis].max() + 3 - 1e-6 <= high
     # The numbers are on the sides from which it is seen.
-    middle = np.array([sum(field.x) / 2, sum(field.y) / 2])
-    near = np.array(field.near) - middle
+    near = np.array(field.near) - np.mean([field.x, field.y], axis=1)
     assert near @ -camera.axes[2, :2] >= -1e-6
 
 
 def test_an_animation_ends_in_the_goal_and_blocks_are_placed_in_order():
-    scene = TASK.scene
-    with Image.open(io.BytesIO(assembly_gif(scene, SMALL))) as image:
-        assert (image.n_frames, image.info["loop"]) == (len(scene), 0)
+    with Image.open(io.BytesIO(pictures.assembly_gif(SCENE, SMALL))) as image:
+        assert (image.n_frames, image.info["loop"]) == (len(SCENE), 0)
         *_, last = (np.asarray(one.convert("RGB")) for one in ImageSequence.Iterator(image))
-    assert np.abs(last - pixels(pictures.goal_png(scene, SMALL))).mean() < 3
-    backward = Scene("backward", (1,), scene.blocks[::-1], ("backward",))
+    assert np.abs(last - pixels(pictures.goal_png(SCENE, SMALL))).mean() < 3
     with pytest.raises(DataError, match="backward"):
-        assembly_gif(backward, SMALL)
+        pictures.assembly_gif(replace(SCENE, id="backward", blocks=SCENE.blocks[::-1]), SMALL)
