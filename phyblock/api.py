@@ -37,6 +37,7 @@ from pydantic import (
 from phyblock.config.models import load_models
 from phyblock.config.suite import Suite
 from phyblock.config.validation import problems_of
+from phyblock.config.yaml import read_yaml
 from phyblock.data.base import Dataset
 from phyblock.data.lookup import find_data_set, open_dataset
 from phyblock.data.scenes import SCENES_FILE
@@ -615,10 +616,10 @@ def run_suite(
     """
     loaded = suite if isinstance(suite, Suite) else load_suite(suite)
     named = None if models_file is None else str(models_file)
-    known = load_models(find_models_file(named, loaded.files.path))
-    plan = make_plan(loaded, known, only=models or (), limit=limit)
+    models_path = find_models_file(named, loaded.files.path)
+    plan = make_plan(loaded, load_models(models_path), only=models or (), limit=limit)
     folder = plan.folder_in(Path("results")) if out is None else Path(out)
-    check_models(plan.models)
+    check_models(plan.models, read_yaml(models_path), needs_keys=True)
     asks: dict[str, Any] = {"use_cache": use_cache, "retry_failed": retry_failed}
     is_agreed = yes or plan.suite.limits.max_cost_usd is not None
     if costly := [] if is_agreed else may_bill(plan, folder, **asks):

@@ -42,6 +42,7 @@ from phyblock.cli.console import (
 from phyblock.cli.progress import ProgressView
 from phyblock.cli.results import show_tables
 from phyblock.config.models import load_models
+from phyblock.config.yaml import read_yaml
 from phyblock.errors import Problem, SpecError
 from phyblock.files import OutFolder
 from phyblock.records.files import RECORDS, read_manifest
@@ -104,8 +105,9 @@ def run(
     """
     console = make_console()
     loaded = read_suite(suite, sets)
-    known = load_models(find_models_file(models_file, loaded.files.path))
-    plan = make_plan(loaded, known, only=models, limit=limit)
+    models_path = find_models_file(models_file, loaded.files.path)
+    plan = make_plan(loaded, load_models(models_path), only=models, limit=limit)
+    check = partial(check_models, plan.models, read_yaml(models_path), needs_keys=True)
     folder = out or plan.folder_in(Path("results"))
     made = folder / (TABLES if no_report else REPORT_FILE)
     held = held_run(folder, plan.manifest)
@@ -124,11 +126,11 @@ def run(
     if dry_run:
         print_estimate(console, plan, estimate(plan, folder, **asks))
         try:
-            check_models(plan.models)
+            check()
         except SpecError as error:
             console.print(f"A run would not begin:\n{error}", style="yellow")
         return 0
-    check_models(plan.models)
+    check()
     has_limit = plan.suite.limits.max_cost_usd is not None
     is_asked = sys.stdin is not None and sys.stdin.isatty()
     if rows := [] if yes or (has_limit and not is_asked) else may_bill(plan, folder, **asks):

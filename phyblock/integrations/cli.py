@@ -51,6 +51,8 @@ def export(
     named = (run is not None) + scenes + (questions is not None)
     if named != (form != "lmms-eval"):
         raise click.UsageError("Name the folder of a run, --scenes or --questions.")
+    if run is not None and limit is not None:
+        raise click.UsageError("--limit is for scenes, questions and tasks.")
     makers: dict[str, Callable[[], Sequence[Path]]] = {}
     if run is not None:
         loaded, folder = load_run(run), out or run / "export" / form

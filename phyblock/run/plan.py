@@ -275,14 +275,16 @@ def to_config(name: str, known: ModelConfig, suite: Suite) -> ModelConfig:
     return config.model_copy(update={"response_format": "always" if sends else "never"})
 
 
-def check_models(models: Iterable[ModelConfig], source: YamlSource | None = None) -> None:
+def check_models(
+    models: Iterable[ModelConfig], source: YamlSource, *, needs_keys: bool = False
+) -> None:
     """Raise SpecError naming all models that cannot be asked: missing recordings, unknown
-    providers, and before a run, without the `source` of the models file, keys that are not set.
+    providers, and with `needs_keys` keys that are not set. `source` is the models file.
     """
     problems: list[Problem] = []
     for config in models:
         name, where = config.name, f"model {config.name}"
-        if source is not None:
+        if (name,) in source.places:
             where = source.where((name, "replay" if config.replay is not None else "id"))
         if config.replay is not None and not os.path.isdir(config.replay):
             message, hint = "recordings not found", "the path is relative to the models file"
@@ -302,11 +304,11 @@ def check_models(models: Iterable[ModelConfig], source: YamlSource | None = None
                 problems.append(Problem(where, message, f"{name}.id", config.id, allowed, hint))
                 continue
         status = api_key_status(config)
-        if source is None and status.is_needed and not status.key:
+        if needs_keys and status.is_needed and not status.key:
             variables = " or ".join(status.variables)
             hint = f"set {variables} in the environment, or exclude the model with --models"
             message = "needs an API key, and none is set"
-            problems.append(Problem(where, message, "", config.id, hint=hint))
+            problems.append(Problem(where, message, f"{name}.id", config.id, hint=hint))
     if problems:
         raise SpecError(problems)
 

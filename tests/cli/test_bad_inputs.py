@@ -215,7 +215,7 @@ INPUTS = (
     Bad("no-price", command(*FRESH, "--models", "alpha", "--set", "limits.max_cost_usd=1"),
         ("model alpha: price", "max_cost_usd", "models.yaml"), writes=("fresh",)),
     Bad("no-recording", models_text("old: {replay: replies}\n", "--models", "old"),
-        ("model old", "recordings not found", "replies"), writes=("fresh",)),
+        ("models.yaml:1:15: old.replay: recordings not found", "replies"), writes=("fresh",)),
 )  # fmt: skip
 FOLDERS = (
     Bad("below-file", file_in_the_way("run", "suite.yaml", "--out", "taken/x"),
@@ -232,6 +232,7 @@ FOLDERS = (
     Bad("show-none", command("show", "out", "no-such"), ("no-such", "0 samples fit")),
     Bad("show-several", command("show", "out", "random"), ("5 samples fit", "allowed: ")),
     Bad("export-nothing", command("export", "--to", "csv"), ("Name the folder of a run",)),
+    Bad("export-limit", command("export", "out", "--to", "csv", "--limit", "1"), ("--limit is",)),
     Bad("export-form", command("export", "out", "--to", "vlmevalkit"), ("is not one of csv, hf",)),
     Bad("figure", command("figures", "out", "--only", "radar"), ("no such figure",)),
     Bad("width", command("figures", "out", "--width", "20"), ("Invalid value",)),

@@ -26,7 +26,7 @@ def test_what_init_lays_out_is_sound_and_its_prompts_are_used(workspace, suite):
     words += ("--dry-run", "--models-file", "mine/models.yaml")
     out = workspace.does(*words).out
     assert "calls, unknown cost of 1 model" in out
-    assert "A run would not begin:\nmodel alpha: needs an API key" in out
+    assert "would not begin:\nmine/models.yaml:1:8: alpha.id: needs an API key" in out
     prompt.write_text("{% block user %}{{ gone }}{% endblock %}", encoding="utf-8")
     assert f"prompts/{prompt.name}:1: block user: " in workspace.phyblock(*words).err
 
