@@ -19,10 +19,11 @@ import sys
 import tempfile
 import threading
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from multiprocessing import forkserver, get_context
 from multiprocessing.connection import Connection
-from multiprocessing.context import ForkServerContext, ForkServerProcess
+from multiprocessing.context import ForkServerContext
 from pathlib import Path
 from typing import IO, Any, NoReturn
 from unittest import mock
@@ -61,37 +62,33 @@ def killed(marks: Path, times: int) -> str:
     return "done"
 
 
-def run_forked(
-    args: Sequence[str],
-    cwd: Path,
-    env: Mapping[str, str],
-    bytes_left: int | None = None,
-    timeout_s: float = 300,
-    deeds: IO[bytes] | None = None,
-) -> Done:
-    """Run the command to its end; what it does to files and hosts is written to `deeds`."""
-    watching = () if deeds is None else (deeds,)
-    with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
-        files = (out, err, *watching)
-        process = _started(args, cwd, env, files, bytes_left=bytes_left, leads=False)
-        code = _code(process, timeout_s)
-        texts = []
-        for file in (out, err):
-            file.seek(0)
-            texts.append(file.read().decode(errors="replace" if watching else "strict"))
-    return Done(code, *texts)
-
-
 class Forked:
-    """A command that was started, as `subprocess.Popen` shows one; it leads a group of its own."""
+    """A command that was started, as `subprocess.Popen` shows one; it leads a group of its own.
 
-    def __init__(self, args: Sequence[str], cwd: Path, env: Mapping[str, str]) -> None:
+    It can write so many bytes to a file; what it does to files and hosts is written to `deeds`.
+    """
+
+    def __init__(
+        self,
+        args: Sequence[str],
+        cwd: Path,
+        env: Mapping[str, str],
+        bytes_left: int | None = None,
+        deeds: IO[bytes] | None = None,
+    ) -> None:
         pipes = [os.pipe() for _ in range(2)]
-        self.stdout, self.stderr = (os.fdopen(read, encoding="utf-8") for read, _ in pipes)
-        writes = [os.fdopen(write, "wb") for _, write in pipes]
-        self._process = _started(args, cwd, env, writes, bytes_left=None, leads=True)
-        for file in writes:
-            file.close()
+        self.stdout, self.stderr = (
+            os.fdopen(read, encoding="utf-8", errors="replace" if deeds else "strict")
+            for read, _ in pipes
+        )
+        ends = [Connection(write, readable=False) for _, write in pipes]
+        if deeds is not None:
+            ends.append(Connection(os.dup(deeds.fileno()), readable=False))
+        order = (list(args), str(cwd), dict(env), bytes_left, ends)
+        self._process = _context().Process(target=_become, args=order)
+        self._process.start()
+        for end in ends:
+            end.close()
         self.pid: int = self._process.pid
 
     def __enter__(self) -> Forked:
@@ -108,13 +105,19 @@ class Forked:
     returncode = property(poll)
 
     def wait(self, timeout: float = 300) -> int:
-        return _code(self._process, timeout)
+        """The exit code once it has ended; kills it when that takes too long."""
+        self._process.join(timeout)
+        if self.poll() is None:
+            self._process.kill()
+            raise subprocess.TimeoutExpired(["phyblock"], timeout)
+        return self.returncode
 
     def communicate(self, timeout: float = 300) -> tuple[str, str]:
-        """Wait for its end; what it wrote, which must fit into the pipes."""
-        self.wait(timeout)
-        with self.stdout, self.stderr:
-            return self.stdout.read(), self.stderr.read()
+        """Wait for its end; what it wrote."""
+        with ThreadPoolExecutor() as pool, self.stdout, self.stderr:
+            out, err = (pool.submit(stream.read) for stream in (self.stdout, self.stderr))
+            self.wait(timeout)
+            return out.result(), err.result()
 
     def send_signal(self, number: int) -> None:
         if self.poll() is None:
@@ -122,6 +125,13 @@ class Forked:
 
     def kill(self) -> None:
         self.send_signal(signal.SIGKILL)
+
+
+def run_forked(*args: Any, timeout_s: float = 300, **options: Any) -> Done:
+    """Run the command of a `Forked` to its end."""
+    process = Forked(*args, **options)
+    texts = process.communicate(timeout_s)
+    return Done(process.returncode, *texts)
 
 
 @functools.cache
@@ -134,32 +144,13 @@ def _context() -> ForkServerContext:
     return context
 
 
-def _started(
-    args: Sequence[str],
-    cwd: Path,
+def _become(
+    args: list[str],
+    cwd: str,
     env: Mapping[str, str],
-    files: Sequence[IO[bytes]],
-    **options: Any,
-) -> ForkServerProcess:
-    order = {"args": list(args), "cwd": str(cwd), "env": dict(env), **options}
-    ends = [Connection(os.dup(file.fileno()), readable=False) for file in files]
-    process = _context().Process(target=_become, args=(order, ends))
-    process.start()
-    for end in ends:
-        end.close()
-    return process
-
-
-def _code(process: ForkServerProcess, timeout_s: float) -> int:
-    """The exit code once the process has ended; kills it when that takes too long."""
-    process.join(timeout_s)
-    if process.exitcode is None:
-        process.kill()
-        raise subprocess.TimeoutExpired(["phyblock"], timeout_s)
-    return process.exitcode
-
-
-def _become(order: Mapping[str, Any], ends: Sequence[Connection]) -> NoReturn:
+    bytes_left: int | None,
+    ends: Sequence[Connection],
+) -> NoReturn:
     for number, (name, end) in enumerate(zip(("stdout", "stderr"), ends, strict=False), 1):
         os.dup2(end.fileno(), number)
         end.close()
@@ -169,20 +160,19 @@ def _become(order: Mapping[str, Any], ends: Sequence[Connection]) -> NoReturn:
         new.reconfigure(line_buffering=name == "stderr")
         setattr(sys, name, new)
         setattr(sys, f"__{name}__", new)
-    if order["leads"]:
-        os.setsid()
-    os.chdir(order["cwd"])
+    os.setsid()
+    os.chdir(cwd)
     os.environ.clear()
-    os.environ.update(order["env"])
+    os.environ.update(env)
     tempfile.tempdir = None
-    if (bytes_left := order["bytes_left"]) is not None:
+    if bytes_left is not None:
         signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
         resource.setrlimit(resource.RLIMIT_FSIZE, (bytes_left, bytes_left))
     if len(ends) > 2:
         sys.dont_write_bytecode = True
         resource.setrlimit(resource.RLIMIT_AS, (_MOST_MEMORY_BYTES, _MOST_MEMORY_BYTES))
         _watch_deeds(ends[2].fileno())
-    sys.argv = ["phyblock", *order["args"]]
+    sys.argv = ["phyblock", *args]
     from phyblock.cli.main import main
 
     try:

@@ -5,7 +5,6 @@ A batch answers each of its requests as the server would answer it alone, and co
 """
 
 import json
-import time
 from collections import Counter
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field
@@ -44,21 +43,31 @@ class BatchFaults:
 
 @dataclass
 class Made:
-    """A batch; `state` is running until it was looked at often enough."""
+    """A batch; `state` is running until it was looked at often enough. It has lines of requests
+    that were answered, and of those that were not.
+    """
 
-    id: str
     token: str
     requests: list[tuple[str, dict[str, Any]]]
     ordinal: int
-    created_s: float
+    created: datetime
     looks: int = 0
     state: str = "running"
     seen: list[Seen] = field(default_factory=list)
-    lines: list[str] = field(default_factory=list)
+    good: list[str] = field(default_factory=list)
+    bad: list[str] = field(default_factory=list)
+
+    @property
+    def id(self) -> str:
+        return f"batch-{self.ordinal}"
 
 
 class BatchServer(LocalServer):
-    """One protocol's batches; `asked` counts each request that was worked on, by sample."""
+    """One protocol's batches; `asked` counts each request that was worked on, by sample.
+
+    The class of a protocol gives it `line`, a line of the results, and `told`, which is what the
+    provider says of a batch.
+    """
 
     def __init__(self, *args: Any, batch: BatchFaults | None = None, **options: Any) -> None:
         super().__init__(*args, **options)
@@ -70,37 +79,16 @@ class BatchServer(LocalServer):
         self.under_way = 0
         self.keys: set[str] = set()
         self.moment: Callable[[str], None] = lambda _: None
-        self._met: Counter[str] = Counter()
-
-    def key_of(self, request: web.Request) -> str:
-        """The key that a request brings."""
-        raise NotImplementedError
-
-    def line(self, custom_id: str, seen: Seen, ending: str) -> dict[str, Any]:
-        """A line of the results."""
-        raise NotImplementedError
-
-    def told(self, made: Made) -> dict[str, Any]:
-        """Return what the provider says of a batch."""
-        raise NotImplementedError
 
     def call(self, kind: str, work: Callable[[web.Request], Awaitable[Any]]) -> Handler:
         """A handler that does a call's work, or what it meets; moments lie before and after."""
 
-        async def handle(request: web.Request) -> web.StreamResponse:
-            self.under_way += 1
-            try:
-                return await answer(request)
-            finally:
-                self.under_way -= 1
-
         async def answer(request: web.Request) -> web.StreamResponse:
+            faults = self.batch_faults.calls.get(kind, ())
+            fault = dict(enumerate(faults)).get(self.calls.count(kind), "")
             self.calls.append(kind)
             self.keys.add(self.key_of(request))
             self.moment(f"{kind} arrived")
-            faults = self.batch_faults.calls.get(kind, ())
-            fault = faults[self._met[kind]] if self._met[kind] < len(faults) else ""
-            self._met[kind] += 1
             if fault == "reset":
                 return reset_connection(request)
             if fault.isdigit():
@@ -112,46 +100,45 @@ class BatchServer(LocalServer):
                 return reset_connection(request)
             return done if isinstance(done, web.StreamResponse) else web.json_response(done)
 
+        async def handle(request: web.Request) -> web.StreamResponse:
+            self.under_way += 1
+            try:
+                return await answer(request)
+            finally:
+                self.under_way -= 1
+
         return handle
 
-    async def look_at(self, request: web.Request) -> dict[str, Any]:
-        """A call that looks at a batch."""
+    async def look(self, request: web.Request) -> dict[str, Any]:
+        """A call that looks at a batch, and brings it nearer to its end."""
         made = self.find(request)
-        self.look(made)
-        return self.told(made)
-
-    def make(self, token: str, requests: list[Any], call: web.Request) -> dict[str, Any]:
-        """Begin a batch, which works on its requests whether it is looked at or not."""
-        number = len(self.made)
-        made = Made(f"batch-{number}", token, requests, number, time.time())
-        self.made.append(made)
-        faults = self.batch_faults.lines.get(number, {})
-        for place, (_, body) in enumerate(requests):
-            seen = self.read(body, call)
-            self.seen.append(seen)
-            made.seen.append(seen)
-            is_asked = self.batch_faults.ends.get(number) != "refused"
-            if is_asked and faults.get(place) not in NEVER_ASKED:
-                self.asked[seen.sample] += 1
-        return self.told(made)
-
-    def id_of(self, token: str) -> str | None:
-        """The id of the batch with this name."""
-        made = next((made for made in self.made if made.token == token), None)
-        told = {} if made is None else self.told(made)
-        return told.get("id") or told.get("name")
-
-    def find(self, request: web.Request) -> Made:
-        wanted = request.match_info["id"].removeprefix("out-").partition(".")[0]
-        return next(made for made in self.made if made.id == wanted)
-
-    def look(self, made: Made) -> None:
-        """Bring a batch nearer to its end."""
         made.looks += 1
         if made.state == "running" and made.looks >= self.batch_faults.looks:
             made.state = self.batch_faults.ends.get(made.ordinal, "ended")
             if made.state != "refused":
                 self._answer(made)
+        return self.told(made)
+
+    def make(self, token: str, requests: list[Any], call: web.Request) -> dict[str, Any]:
+        """Begin a batch, which works on its requests whether it is looked at or not."""
+        made = Made(token, requests, len(self.made), datetime.now(UTC))
+        self.made.append(made)
+        made.seen = [self.read(body, call) for _, body in requests]
+        self.seen += made.seen
+        if self.batch_faults.ends.get(made.ordinal) != "refused":
+            faults = self.batch_faults.lines.get(made.ordinal, {})
+            for place, seen in enumerate(made.seen):
+                self.asked[seen.sample] += faults.get(place) not in NEVER_ASKED
+        return self.told(made)
+
+    def id_of(self, token: str) -> str | None:
+        """The id of the batch with this name."""
+        told = next((self.told(made) for made in self.made if made.token == token), {})
+        return told.get("id") or told.get("name")
+
+    def find(self, request: web.Request) -> Made:
+        wanted = request.match_info["id"].removeprefix("out-").partition(".")[0]
+        return next(made for made in self.made if made.id == wanted)
 
     def _answer(self, made: Made) -> None:
         faults = self.batch_faults.lines.get(made.ordinal, {})
@@ -162,9 +149,10 @@ class BatchServer(LocalServer):
             whole = json.dumps(self.line(custom_id, seen, "ok" if ending in ODD else ending))
             if ending == "broken":
                 whole = whole[: len(whole) // 2]
-            made.lines += [whole, whole] if ending == "twice" else [whole]
+            lines = made.bad if ending.isdigit() or ending in NEVER_ASKED else made.good
+            lines += [whole, whole] if ending == "twice" else [whole]
             if ending == "stranger":
-                made.lines.append(json.dumps(self.line("nobody-7", seen, "ok")))
+                lines.append(json.dumps(self.line("nobody-7", seen, "ok")))
 
 
 class OpenAIBatches(BatchServer, OpenAIChat):
@@ -175,10 +163,7 @@ class OpenAIBatches(BatchServer, OpenAIChat):
         app.router.add_post("/v1/files", self.call("upload", self._upload))
         app.router.add_get("/v1/files/{id}/content", self.call("results", self._content))
         app.router.add_post("/v1/batches", self.call("create", self._create))
-        app.router.add_get("/v1/batches/{id}", self.call("look", self.look_at))
-
-    def key_of(self, request: web.Request) -> str:
-        return request.headers.get("Authorization", "").removeprefix("Bearer ")
+        app.router.add_get("/v1/batches/{id}", self.call("look", self.look))
 
     def line(self, custom_id: str, seen: Seen, ending: str) -> dict[str, Any]:
         response, error = None, None
@@ -194,8 +179,7 @@ class OpenAIBatches(BatchServer, OpenAIChat):
     async def _upload(self, request: web.Request) -> dict[str, Any]:
         form = await request.post()
         assert form["purpose"] == "batch"
-        file = form["file"]
-        self.files.append([json.loads(line) for line in file.file.read().splitlines()])
+        self.files.append([json.loads(line) for line in form["file"].file.read().splitlines()])
         return {"id": f"file-{len(self.files) - 1}", "object": "file", "purpose": "batch"}
 
     async def _create(self, request: web.Request) -> dict[str, Any]:
@@ -207,36 +191,25 @@ class OpenAIBatches(BatchServer, OpenAIChat):
         return self.make(body["metadata"]["phyblock"], requests, request)
 
     async def _content(self, request: web.Request) -> web.Response:
-        is_bad = request.match_info["id"].endswith(".bad")
-        lines = [line for line in self.find(request).lines if _failed(line) == is_bad]
+        made = self.find(request)
+        lines = made.bad if request.match_info["id"].endswith(".bad") else made.good
         return web.Response(text="\n".join(lines), content_type="application/jsonl")
 
     def told(self, made: Made) -> dict[str, Any]:
         words = {"running": "in_progress", "ended": "completed", "refused": "failed"}
-        has_ended = made.state not in ("running", "refused")
-        done, bad = len(made.lines), sum(map(_failed, made.lines))
         errors = {"data": [{"code": "token_limit_exceeded", "message": "Enqueued token limit"}]}
+        counts = {"total": len(made.requests), "completed": len(made.good), "failed": len(made.bad)}
         return {
             "id": made.id,
             "object": "batch",
             "status": words.get(made.state, made.state),
             "metadata": {"phyblock": made.token},
-            "request_counts": {
-                "total": len(made.requests), "completed": done - bad, "failed": bad,
-            },
-            "created_at": int(made.created_s),
+            "request_counts": counts,
+            "created_at": int(made.created.timestamp()),
             "errors": errors if made.state == "refused" else None,
-            "output_file_id": f"{made.id}.good" if has_ended and done > bad else None,
-            "error_file_id": f"{made.id}.bad" if has_ended and bad else None,
-        }  # fmt: skip
-
-
-def _failed(line: str) -> bool:
-    try:
-        response = json.loads(line)["response"]
-    except ValueError:
-        return False
-    return response is None or response["status_code"] != 200
+            "output_file_id": f"{made.id}.good" if made.good else None,
+            "error_file_id": f"{made.id}.bad" if made.bad else None,
+        }
 
 
 class AnthropicBatches(BatchServer, AnthropicMessages):
@@ -246,12 +219,12 @@ class AnthropicBatches(BatchServer, AnthropicMessages):
         super().add_routes(app)
         path = "/v1/messages/batches"
         app.router.add_post(path, self.call("create", self._create))
-        app.router.add_get(path + "/{id}", self.call("look", self.look_at))
+        app.router.add_get(path + "/{id}", self.call("look", self.look))
         app.router.add_get(path + "/{id}/results", self.call("results", self._results))
 
     def key_of(self, request: web.Request) -> str:
         assert request.headers["anthropic-version"] == "2023-06-01"
-        return request.headers["x-api-key"]
+        return super().key_of(request)
 
     def line(self, custom_id: str, seen: Seen, ending: str) -> dict[str, Any]:
         kinds = {"400": "invalid_request_error", "500": "api_error", "429": "rate_limit_error"}
@@ -272,16 +245,16 @@ class AnthropicBatches(BatchServer, AnthropicMessages):
 
     async def _results(self, request: web.Request) -> web.Response:
         # In no order of the requests.
-        text = "".join(f"{line}\n" for line in reversed(self.find(request).lines))
+        made = self.find(request)
+        text = "".join(f"{line}\n" for line in reversed(made.good + made.bad))
         return web.Response(text=text, content_type="application/x-jsonl")
 
     def told(self, made: Made) -> dict[str, Any]:
         has_ended = made.state != "running"
-        kinds = [line.split('"type": "', 1)[-1].split('"', 1)[0] for line in made.lines]
-        names = ("succeeded", "errored", "canceled", "expired")
-        counts = {name: kinds.count(name) for name in names}
+        kinds = [json.loads(line)["result"]["type"] for line in made.bad]
+        counts = {name: kinds.count(name) for name in ("errored", "canceled", "expired")}
+        counts["succeeded"] = len(made.good)
         counts["processing"] = len(made.requests) - sum(counts.values())
-        created = datetime.fromtimestamp(made.created_s, UTC)
         # The provider names its own address, whichever gateway it was asked through.
         own = f"https://api.anthropic.com/v1/messages/batches/{made.id}/results"
         return {
@@ -290,7 +263,7 @@ class AnthropicBatches(BatchServer, AnthropicMessages):
             "processing_status": "ended" if has_ended else "in_progress",
             "request_counts": counts,
             "archived_at": None,
-            "created_at": created.isoformat().replace("+00:00", "Z"),
+            "created_at": made.created.isoformat().replace("+00:00", "Z"),
             "results_url": own if has_ended else None,
         }
 
@@ -303,13 +276,10 @@ class GeminiBatches(BatchServer, GeminiGenerate):
         app.router.add_post("/upload/v1beta/files", self.call("upload", self._announce))
         app.router.add_post("/upload/v1beta/sent", self._upload)
         app.router.add_post("/v1beta/models/{name}:batchGenerateContent", create)
-        app.router.add_get("/v1beta/batches/{id}", self.call("look", self.look_at))
+        app.router.add_get("/v1beta/batches/{id}", self.call("look", self.look))
         results = self.call("results", self._results)
         app.router.add_get("/download/v1beta/files/{id}:download", results)
         super().add_routes(app)
-
-    def key_of(self, request: web.Request) -> str:
-        return request.headers["x-goog-api-key"]
 
     def line(self, custom_id: str, seen: Seen, ending: str) -> dict[str, Any]:
         codes = {"400": 3, "429": 8, "500": 13, "cancelled": 1, "expired": 1}
@@ -338,27 +308,23 @@ class GeminiBatches(BatchServer, GeminiGenerate):
 
     async def _results(self, request: web.Request) -> web.Response:
         assert request.query["alt"] == "media"
-        text = "\n".join(self.find(request).lines)
+        made = self.find(request)
+        text = "\n".join(made.bad + made.good)
         return web.Response(text=text, content_type="application/jsonl")
 
     def told(self, made: Made) -> dict[str, Any]:
         words = {"running": "RUNNING", "ended": "SUCCEEDED", "refused": "FAILED"}
-        has_results = made.state in ("ended", "cancelled") and made.lines
-        created = datetime.fromtimestamp(made.created_s, UTC).isoformat()
         output = {"responsesFile": f"files/out-{made.id}"}
-        answered = sum('"response"' in line for line in made.lines)
-        counts = {
-            "requestCount": str(len(made.requests)), "successfulRequestCount": str(answered),
-        }  # fmt: skip
-        return {
-            "name": f"batches/{made.id}",
-            "metadata": {
-                "displayName": made.token,
-                "state": f"BATCH_STATE_{words.get(made.state, made.state.upper())}",
-                "createTime": created.replace("+00:00", "123Z"),
-                "batchStats": counts,
-                **({"output": output} if has_results else {}),
+        metadata = {
+            "displayName": made.token,
+            "state": f"BATCH_STATE_{words.get(made.state, made.state.upper())}",
+            "createTime": made.created.isoformat().replace("+00:00", "123Z"),
+            "batchStats": {
+                "requestCount": str(len(made.requests)),
+                "successfulRequestCount": str(len(made.good)),
             },
-            "done": made.state != "running",
-            **({"response": output} if made.state == "ended" else {}),
         }
+        if made.state in ("ended", "cancelled") and made.good + made.bad:
+            metadata["output"] = output
+        done = {"name": f"batches/{made.id}", "metadata": metadata, "done": made.state != "running"}
+        return done | ({"response": output} if made.state == "ended" else {})

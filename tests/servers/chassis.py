@@ -12,21 +12,21 @@ import asyncio
 import base64
 import hashlib
 import json
-import threading
-from abc import ABC, abstractmethod
-from collections import Counter
-from collections.abc import Callable, Coroutine, Mapping, Sequence
-from contextlib import AbstractAsyncContextManager, nullcontext
+from collections import Counter, deque
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from typing import Any
 
 from aiohttp import web
+from anyio.from_thread import start_blocking_portal
 
 from tests.servers.faults import WIRE_FAULTS, reset_connection
 from tests.workspace import plan_text
 
 FAULTS = ("429", "500", "reset", "cut", "html", "empty")
-ELSEWHERE = "http://localhost:9"
+REPLIES = ("ok", "length", "filtered", "blank", "empty")
+"""Ways in which an answer is a reply; an empty one has no choices."""
 
 
 @dataclass(frozen=True)
@@ -97,28 +97,25 @@ class Seen:
         return plan_text(*(byte % 16 + 1 for byte in digest[:4]))
 
 
-class LocalServer(ABC):
-    """One provider's protocol; `ended` counts requests by how they ended.
+class LocalServer:
+    """A server of one protocol, whose class gives it `add_routes`, which lead to `handle`; `read`,
+    a request in common terms; `reply` by its ending, one of REPLIES; and `error`, an error body.
 
-    `elsewhere` is where redirects to another host lead. At most `width` requests are looked at
-    together; None is no bound. While it `holds`, which a test may end, no request is answered.
-    `usage` counts the tokens of a prompt and its reply.
+    `ended` counts requests by how they ended. `elsewhere` is where redirects to another host lead.
+    At most `width` requests are looked at together. While it `holds`, which a test may end, no
+    request is answered. `usage` counts the tokens of a prompt and its reply.
     """
 
     def __init__(
         self,
         faults: Faults | None = None,
         *,
-        keep: bool = True,
-        elsewhere: str = ELSEWHERE,
-        width: int | None = None,
+        elsewhere: str = "http://localhost:9",
+        width: int = 10_000,
         holds: bool = False,
         usage: Callable[[Seen], tuple[int, int]] = lambda _: (1000, 40),
     ) -> None:
-        self._gate: AbstractAsyncContextManager[None] = (
-            nullcontext() if width is None else asyncio.Semaphore(width)
-        )
-        self.keep = keep
+        self._gate = asyncio.Semaphore(width)
         self.elsewhere = elsewhere
         self.holds = holds
         self.usage = usage
@@ -128,58 +125,31 @@ class LocalServer(ABC):
     def forget(self, faults: Faults | None = None) -> None:
         """Begin as new, with other faults."""
         self.faults = faults or Faults()
-        self.seen: list[Seen] = []
+        self.seen: deque[Seen] | list[Seen] = []
         self.ended: Counter[str] = Counter()
         self.by_sample: Counter[str] = Counter()
-
-    @abstractmethod
-    def read(self, body: dict[str, Any], request: web.Request) -> Seen:
-        """The request in common terms."""
-
-    @abstractmethod
-    def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
-        """A reply; `ending` is "ok", "length", "filtered", "blank" or "empty" (no choices)."""
-
-    @abstractmethod
-    def error(self, status: int, ending: str, message: str) -> dict[str, Any]:
-        """An error body."""
-
-    @abstractmethod
-    def add_routes(self, app: web.Application) -> None:
-        """Register the protocol's routes with `self.handle`."""
 
     @property
     def requests(self) -> int:
         return sum(self.ended.values())
 
-    def app(self) -> web.Application:
-        app = web.Application(client_max_size=64 * 2**20)
-        self.add_routes(app)
-        return app
-
     async def handle(self, request: web.Request) -> web.StreamResponse:
         async with self._gate:
             self.at_once += 1
             try:
-                return await self._handle(request)
+                seen = self.read(await request.json(), request)
+                self.seen.append(seen)
+                self.by_sample[seen.sample] += 1
+                ending = self.faults.draw(seen.sample, self.by_sample[seen.sample])
+                if ending == "seed" and seen.seed is None:
+                    ending = "ok"
+                self.ended[ending] += 1
+                await asyncio.sleep(self.faults.latency_s)
+                while self.holds:
+                    await asyncio.sleep(0.005)
+                return await self._end(seen, ending, request)
             finally:
                 self.at_once -= 1
-
-    async def _handle(self, request: web.Request) -> web.StreamResponse:
-        seen = self.read(await request.json(), request)
-        sample = seen.sample
-        if self.keep:
-            self.seen.append(seen)
-        self.by_sample[sample] += 1
-        ending = self.faults.draw(sample, self.by_sample[sample])
-        if ending == "seed" and seen.seed is None:
-            ending = "ok"
-        self.ended[ending] += 1
-        if self.faults.latency_s:
-            await asyncio.sleep(self.faults.latency_s)
-        while self.holds:
-            await asyncio.sleep(0.005)
-        return await self._end(seen, ending, request)
 
     async def _end(self, seen: Seen, ending: str, request: web.Request) -> web.StreamResponse:
         if ending in WIRE_FAULTS:
@@ -193,11 +163,8 @@ class LocalServer(ABC):
         if ending == "cut":
             whole = json.dumps(self.reply(seen, "ok"))
             return web.Response(text=whole[: len(whole) // 2], content_type="application/json")
-        if ending in ("ok", "empty", "length", "filtered", "blank"):
+        if ending in REPLIES:
             return web.json_response(self.reply(seen, ending))
-        return self._refuse(seen, ending)
-
-    def _refuse(self, seen: Seen, ending: str) -> web.Response:
         status, message = {
             "429": (429, "Rate limit reached"),
             "500": (500, "The server had an error"),
@@ -224,73 +191,56 @@ class Running:
     def __init__(self, server: LocalServer) -> None:
         self.server = server
         self.port = 0
-        self._ready = threading.Event()
-        self._stop: asyncio.Event | None = None
-        self._loop: asyncio.AbstractEventLoop | None = None
         self._runner: web.AppRunner | None = None
-        self._thread = threading.Thread(target=lambda: asyncio.run(self._serve()))
+        self._stack = ExitStack()
 
     @property
     def url(self) -> str:
         return f"http://127.0.0.1:{self.port}"
 
-    def __enter__(self) -> Running:
-        self._thread.start()
-        assert self._ready.wait(10), "the server did not start"
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._loop.call_soon_threadsafe(self._stop.set)
-        self._thread.join(10)
-        assert not self._thread.is_alive(), "the server did not stop"
-
-    async def _serve(self) -> None:
-        self._loop = asyncio.get_running_loop()
-        self._stop = asyncio.Event()
-        self._runner, self.port = await start(self.server, 0)
-        self._ready.set()
-        await self._stop.wait()
-        if self._runner is not None:
-            await self._runner.cleanup()
-
     @property
     def is_alive(self) -> bool:
         return self._runner is not None
 
-    def die(self) -> None:
-        """End as a process that is killed: at once, its connections reset."""
-        self._in_loop(self._die())
+    def __enter__(self) -> Running:
+        self._portal = self._stack.enter_context(start_blocking_portal())
+        self.come_back()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        with self._stack:
+            if self._runner is not None:
+                self._portal.call(self._runner.cleanup)
 
     def come_back(self) -> None:
-        """Serve again."""
-        self._in_loop(self._come_back())
-
-    def _in_loop(self, work: Coroutine[Any, Any, None]) -> None:
-        asyncio.run_coroutine_threadsafe(work, self._loop).result(10)
-
-    async def _die(self) -> None:
+        """Serve, or serve again."""
         if self._runner is None:
-            return
-        dying, self._runner = self._runner, None
-        for site in list(dying.sites):
-            await site.stop()
-        for connection in dying.server.connections:
-            if connection.transport is not None:
-                connection.transport.abort()
-        await dying.cleanup()
+            self._runner = self._portal.call(start, self.server, self.port)
+            self.port = self._runner.addresses[0][1]
 
-    async def _come_back(self) -> None:
-        if self._runner is None:
-            self._runner, _ = await start(self.server, self.port)
+    def die(self) -> None:
+        """End as a process that is killed: at once, its connections reset."""
+        if self._runner is not None:
+            dying, self._runner = self._runner, None
+            self._portal.call(_killed, dying)
 
 
-async def start(server: LocalServer, port: int) -> tuple[web.AppRunner, int]:
-    runner = web.AppRunner(server.app(), access_log=None, shutdown_timeout=0.1)
+async def _killed(runner: web.AppRunner) -> None:
+    for site in list(runner.sites):
+        await site.stop()
+    for connection in runner.server.connections:
+        if connection.transport is not None:
+            connection.transport.abort()
+    await runner.cleanup()
+
+
+async def start(server: LocalServer, port: int) -> web.AppRunner:
+    app = web.Application(client_max_size=64 * 2**20)
+    server.add_routes(app)
+    runner = web.AppRunner(app, access_log=None, shutdown_timeout=0.1)
     await runner.setup()
-    site = web.TCPSite(runner, "127.0.0.1", port, backlog=1024)
-    await site.start()
-    bound: int = runner.addresses[0][1]
-    return runner, bound
+    await web.TCPSite(runner, "127.0.0.1", port, backlog=1024).start()
+    return runner
 
 
 def main(kind: type[LocalServer]) -> None:
@@ -301,9 +251,10 @@ def main(kind: type[LocalServer]) -> None:
     given = parser.parse_args()
 
     async def serve() -> None:
-        server = kind(Faults(latency_s=given.latency), keep=False)
-        _, port = await start(server, given.port)
-        print(port, flush=True)
+        server = kind(Faults(latency_s=given.latency))
+        server.seen = deque(maxlen=1)
+        runner = await start(server, given.port)
+        print(runner.addresses[0][1], flush=True)
         await asyncio.Event().wait()
 
     asyncio.run(serve())

@@ -1,16 +1,13 @@
 """Faults by name: what a server can do to whoever asks it, one behaviour each.
 
 `WIRE_FAULTS` holds them all; each is a mode of `Faults`, beside those that the chassis knows. A
-behaviour gets the server, the request as it was read, and the request itself, and ends it. None
-draws a random number: which fault meets which request is decided by `Faults.draw`.
-
-`Ending` says what has to come of a fault, if nothing else happens, whatever the protocol.
+behaviour gets the server, the request as it was read, and the request itself, and ends it; `Ending`
+says what has to come of that, whatever the protocol.
 """
 
 from __future__ import annotations
 
 import asyncio
-import copy
 import gzip
 import json
 import socket
@@ -29,20 +26,13 @@ if TYPE_CHECKING:
 Ending = Literal["reply", "retryable", "unavailable", "sample"]
 Behaviour = Callable[["LocalServer", "Seen", web.Request], Awaitable[web.StreamResponse]]
 
-_BOMB_BYTES = 40 * 2**20
-_DRIP_S = 0.02
-
 
 @dataclass(frozen=True)
 class Fault:
     """A behaviour, and what must come of it."""
 
     behave: Behaviour
-    ending: Ending
-
-
-def _fault(behave: Callable[..., Any], *, ending: Ending = "retryable", **options: Any) -> Fault:
-    return Fault(partial(behave, **options), ending)
+    ending: Ending = "retryable"
 
 
 def reset_connection(request: web.Request) -> web.Response:
@@ -67,104 +57,80 @@ async def _redirect(
 def _sent(
     body: Any = None, status: int = 200, ending: Ending = "retryable", **headers: str
 ) -> Fault:
-    """An answer with this status and body: bytes as they are, anything else as JSON."""
-    data = body if body is None or isinstance(body, bytes) else json.dumps(body).encode()
+    """An answer with this status and body: bytes as they are, anything else as JSON. A function
+    makes it of a good reply and the request.
+    """
 
-    async def behave(_: LocalServer, __: Seen, ___: web.Request) -> web.Response:
-        kind = None if data is None else "application/json"
+    async def behave(server: LocalServer, seen: Seen, _: web.Request) -> web.Response:
+        made = body(server.reply(seen, "ok"), seen) if callable(body) else body
+        data = made if made is None or isinstance(made, bytes) else json.dumps(made).encode()
         named = {name.replace("_", "-"): value for name, value in headers.items()}
-        return web.Response(body=data, status=status, headers=named, content_type=kind)
+        if data is not None:
+            named = {"Content-Type": "application/json", **named}
+        return web.Response(body=data, status=status, headers=named)
 
     return Fault(behave, ending)
 
 
-async def _changed(
-    server: LocalServer,
-    seen: Seen,
-    _: web.Request,
-    *,
-    change: Callable[[dict[str, Any], Seen], Any],
-) -> web.Response:
-    """Answer with a good reply that was changed."""
-    body = copy.deepcopy(server.reply(seen, "ok"))
-    data = json.dumps(change(body, seen)).encode()
-    return web.Response(body=data, content_type="application/json")
-
-
-def _usage(value: Any) -> Callable[[dict[str, Any], Seen], Any]:
+def _usage(value: Any) -> Fault:
     """Each count of a reply's usage becomes `value`; "missing" takes the whole away."""
 
     def change(body: dict[str, Any], _: Seen) -> dict[str, Any]:
         name = "usageMetadata" if "usageMetadata" in body else "usage"
         counts = body.pop(name)
-        if value != "missing":
-            body[name] = dict.fromkeys(counts, value)
-        return body
+        return body if value == "missing" else {**body, name: dict.fromkeys(counts, value)}
 
-    return change
+    return _sent(change, ending="reply")
 
 
 def _texts(value: Any, text: str) -> Any:
     """A copy in which each text of a reply, wherever its protocol puts it, is `text`."""
     if isinstance(value, dict):
-        return {
-            key: text
-            if key in ("text", "content") and isinstance(item, str)
-            else _texts(item, text)
-            for key, item in value.items()
-        }
+        changed = {key: _texts(item, text) for key, item in value.items()}
+        named = [name for name in ("text", "content") if isinstance(value.get(name), str)]
+        return changed | dict.fromkeys(named, text)
     return [_texts(item, text) for item in value] if isinstance(value, list) else value
 
 
-def _emptied(value: Any) -> Callable[[dict[str, Any], Seen], Any]:
+def _emptied(value: Any) -> Fault:
     """The list that holds the answers becomes `value`."""
 
     def change(body: dict[str, Any], _: Seen) -> dict[str, Any]:
         name = next(name for name in ("choices", "candidates", "content") if name in body)
         return {**body, name: value}
 
-    return change
+    return _sent(change)
 
 
 def _with_key(body: dict[str, Any], seen: Seen) -> dict[str, Any]:
     """The key stands in every text and in the model's name."""
-    for name in ("model", "modelVersion"):
-        if name in body:
-            body[name] = f"{body[name]}-{seen.key}"
+    for name in {"model", "modelVersion"} & body.keys():
+        body[name] = f"{body[name]}-{seen.key}"
     return _texts(body, f"{seen.reply_text}\nYour key is {seen.key}.")
 
 
-async def _echo(
-    _: LocalServer, seen: Seen, __: web.Request, *, status: int, shape: str
-) -> web.Response:
-    """Say the key in an error: quoted as JSON, in a text cut short, or in a page."""
-    if shape == "page":
-        page = f"<html>{'x' * 60} {seen.key}</html>"
-        return web.Response(text=page, status=status, content_type="text/html")
-    said = f"bad key {seen.key}" if shape == "json" else f"{'x' * 485} {seen.key}"
-    return web.json_response({"error": {"message": said, "code": None}}, status=status)
+def _echo(said: Callable[[str], str]) -> Fault:
+    """An error that says the key."""
+    return _sent(
+        lambda _, seen: {"error": {"message": said(seen.key), "code": None}}, 400, "sample"
+    )
 
 
-async def _stream(
-    _: LocalServer,
-    __: Seen,
-    request: web.Request,
-    *,
-    chunk: bytes,
-    pause_s: float,
-    encoding: str = "",
-) -> web.StreamResponse:
-    """Answer with a body that never ends."""
-    response = web.StreamResponse(headers={"Content-Type": "application/json"})
-    if encoding:
-        response.headers["Content-Encoding"] = encoding
-    await response.prepare(request)
-    try:
-        while True:
-            await response.write(chunk)
-            await asyncio.sleep(pause_s)
-    except ConnectionError:
-        return response
+def _stream(chunk: bytes, pause_s: float = 0.0, **headers: str) -> Fault:
+    """A body that never ends."""
+
+    async def behave(_: LocalServer, __: Seen, request: web.Request) -> web.StreamResponse:
+        named = {name.replace("_", "-"): value for name, value in headers.items()}
+        response = web.StreamResponse(headers={"Content-Type": "application/json", **named})
+        await response.prepare(request)
+        try:
+            while True:
+                await response.write(chunk)
+                await asyncio.sleep(pause_s)
+        except ConnectionError:
+            return response
+
+    return Fault(behave)
 
 
 async def _reset_midway(
@@ -183,37 +149,43 @@ async def _reset_midway(
     return response
 
 
-async def _raw(_: LocalServer, __: Seen, request: web.Request, *, data: bytes) -> web.Response:
-    """Answer with bytes that are no HTTP, or more of it than anyone reads."""
-    request.transport.write(data)
-    request.transport.close()
-    return web.Response()
+def _raw(data: bytes) -> Fault:
+    """Bytes that are no HTTP, or more of it than anyone reads."""
+
+    async def behave(_: LocalServer, __: Seen, request: web.Request) -> web.Response:
+        request.transport.write(data)
+        request.transport.close()
+        return web.Response()
+
+    return Fault(behave)
 
 
-@cache
-def _bomb(encoding: str) -> bytes:
+def _bomb(encoding: str) -> Fault:
     """A JSON text of 40 MiB in a few hundred kilobytes; twice compressed where two are named."""
-    plain = b'{"choices": "' + b"0" * _BOMB_BYTES + b'"}'
-    if encoding == "deflate":
-        return zlib.compress(plain, 1)
-    packed = gzip.compress(plain, 1)
-    return gzip.compress(packed) if "," in encoding else packed
+
+    @cache
+    def packed() -> bytes:
+        plain = b'{"choices": "' + b"0" * 40 * 2**20 + b'"}'
+        data = zlib.compress(plain, 1) if encoding == "deflate" else gzip.compress(plain, 1)
+        return gzip.compress(data) if "," in encoding else data
+
+    return _sent(lambda *_: packed(), Content_Encoding=encoding)
 
 
-async def _explode(_: LocalServer, __: Seen, ___: web.Request, *, encoding: str) -> web.Response:
-    headers = {"Content-Encoding": encoding}
-    return web.Response(body=_bomb(encoding), headers=headers, content_type="application/json")
+def _packed(
+    compress: Callable[[bytes], bytes], encoding: str, ending: Ending = "retryable"
+) -> Fault:
+    """A good reply, compressed."""
+    return _sent(
+        lambda body, _: compress(json.dumps(body).encode()),
+        ending=ending,
+        Content_Encoding=encoding,
+    )
 
 
-async def _packed(
-    server: LocalServer, seen: Seen, _: web.Request, *, encoding: str, share: float = 1.0
-) -> web.Response:
-    """A good reply, compressed, of which only a share arrives (at 0: not compressed at all)."""
-    plain = json.dumps(server.reply(seen, "ok")).encode()
-    packed = zlib.compress(plain) if encoding == "deflate" else gzip.compress(plain)
-    body = packed[: int(len(packed) * share)] if share else plain
-    headers = {"Content-Encoding": encoding}
-    return web.Response(body=body, headers=headers, content_type="application/json")
+def _half(plain: bytes) -> bytes:
+    packed = gzip.compress(plain)
+    return packed[: len(packed) // 2]
 
 
 def _nested(body: dict[str, Any], _: Seen) -> dict[str, Any]:
@@ -230,7 +202,17 @@ def _error(message: Any, code: Any) -> dict[str, Any]:
 _DEEP = b'{"choices": ' + b"[" * 100_000 + b"]" * 100_000 + b"}"
 _QUOTA = "You exceeded your current quota"
 
-_ERRORS_IN_200: Mapping[str, Fault] = {
+WIRE_FAULTS: Mapping[str, Fault] = {
+    **{
+        f"redirect-{status}-{'away' if away else 'here'}": Fault(
+            partial(_redirect, status=status, away=away), "unavailable"
+        )
+        for status in (301, 302, 303, 307, 308)
+        for away in (False, True)
+    },
+    "redirect-nowhere": _sent(status=302, ending="unavailable"),
+    "redirect-garbled": _sent(status=302, ending="unavailable", Location="http://[::1/v1"),
+    # Bodies that come with status 200 and are no reply.
     "200-quota": _sent(_error(_QUOTA, "insufficient_quota"), ending="unavailable"),
     "200-code-401": _sent(_error("No auth credentials found", "401"), ending="unavailable"),
     "200-code-401-number": _sent(_error("No auth credentials found", 401), ending="unavailable"),
@@ -253,10 +235,7 @@ _ERRORS_IN_200: Mapping[str, Fault] = {
     "200-nan": _sent(b'{"choices": NaN}'),
     "200-deep": _sent(_DEEP),
     "200-huge-number": _sent(b'{"choices": ' + b"9" * 100_000 + b"}"),
-}
-"""Bodies that come with status 200 and are no reply."""
-
-_STATUSES: Mapping[str, Fault] = {
+    # Answers by their status alone.
     "201-empty": _sent(b"", 201),
     "202-accepted": _sent({"status": "queued"}, 202),
     "204": _sent(None, 204),
@@ -274,61 +253,44 @@ _STATUSES: Mapping[str, Fault] = {
     "502-page": _sent(b"<html>Bad gateway</html>", 502),
     "503": _sent(_error("Overloaded", None), 503),
     "529": _sent(_error("Overloaded", None), 529),
-}
-"""Answers by their status alone."""
-
-_CHANGES: Mapping[str, Fault] = {
-    "null-choices": _fault(_changed, change=_emptied(None)),
-    "choices-of-strings": _fault(_changed, change=_emptied(["a", "b"])),
-    "choices-object": _fault(_changed, change=_emptied({"0": {}})),
-    "deep-beside-choices": _fault(_changed, change=_nested),
-    "surrogate": _fault(
-        _changed, ending="reply", change=lambda body, _: _texts(body, "Step1: \ud800 index 1")
+    # Good replies in which something is changed.
+    "null-choices": _emptied(None),
+    "choices-of-strings": _emptied(["a", "b"]),
+    "choices-object": _emptied({"0": {}}),
+    "deep-beside-choices": _sent(_nested),
+    "surrogate": _sent(lambda body, _: _texts(body, "Step1: \ud800 index 1"), ending="reply"),
+    "echo-key-in-reply": _sent(_with_key, ending="reply"),
+    "usage-missing": _usage("missing"),
+    "usage-null": _usage(None),
+    "usage-zero": _usage(0),
+    "usage-negative": _usage(-1_000_000),
+    "usage-huge": _usage(10**30),
+    "usage-true": _usage(True),
+    "usage-fraction": _usage(12.5),
+    "usage-text": _usage("many"),
+    # The key in an error: quoted as JSON, in a text cut short, or in a page.
+    "echo-key-json": _echo("bad key {}".format),
+    "echo-key-cut": _echo((485 * "x" + " {}").format),
+    "echo-key-page": _sent(
+        lambda _, seen: f"<html>{'x' * 60} {seen.key}</html>".encode(), Content_Type="text/html"
     ),
-    "echo-key-in-reply": _fault(_changed, ending="reply", change=_with_key),
-    "usage-missing": _fault(_changed, ending="reply", change=_usage("missing")),
-    "usage-null": _fault(_changed, ending="reply", change=_usage(None)),
-    "usage-zero": _fault(_changed, ending="reply", change=_usage(0)),
-    "usage-negative": _fault(_changed, ending="reply", change=_usage(-1_000_000)),
-    "usage-huge": _fault(_changed, ending="reply", change=_usage(10**30)),
-    "usage-true": _fault(_changed, ending="reply", change=_usage(True)),
-    "usage-fraction": _fault(_changed, ending="reply", change=_usage(12.5)),
-    "usage-text": _fault(_changed, ending="reply", change=_usage("many")),
-}
-"""Good replies in which something is changed."""
-
-WIRE_FAULTS: Mapping[str, Fault] = {
-    **{
-        f"redirect-{status}-{'away' if away else 'here'}": _fault(
-            _redirect, ending="unavailable", status=status, away=away
-        )
-        for status in (301, 302, 303, 307, 308)
-        for away in (False, True)
-    },
-    "redirect-nowhere": _sent(status=302, ending="unavailable"),
-    "redirect-garbled": _sent(status=302, ending="unavailable", Location="http://[::1/v1"),
-    **_ERRORS_IN_200,
-    **_STATUSES,
-    **_CHANGES,
-    "echo-key-json": _fault(_echo, ending="sample", status=400, shape="json"),
-    "echo-key-cut": _fault(_echo, ending="sample", status=400, shape="cut"),
-    "echo-key-page": _fault(_echo, status=200, shape="page"),
-    "reset-midway": _fault(_reset_midway, claimed=0, resets=True),
-    "short-body": _fault(_reset_midway, claimed=5_000, resets=False),
-    "no-http": _fault(_raw, data=b"HELO mail.example\r\n\r\n"),
-    "no-head": _fault(_raw, data=b""),
-    "huge-header": _fault(_raw, data=b"HTTP/1.1 200 OK\r\nX: " + b"x" * 200_000 + b"\r\n\r\n"),
-    "bad-chunk": _fault(_raw, data=b"HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\nxyz\r\n"),
-    "endless": _fault(_stream, chunk=b" " * 65_536, pause_s=0),
-    "endless-gzip": _fault(_stream, chunk=gzip.compress(b" " * 2**20), pause_s=0, encoding="gzip"),
-    "drip": _fault(_stream, chunk=b" ", pause_s=_DRIP_S),
-    "gzip": _fault(_packed, ending="reply", encoding="gzip"),
-    "deflate": _fault(_packed, ending="reply", encoding="deflate"),
-    "gzip-cut": _fault(_packed, encoding="gzip", share=0.5),
-    "gzip-that-is-none": _fault(_packed, encoding="gzip", share=0.0),
-    "brotli-that-is-none": _fault(_packed, encoding="br"),
-    "gzip-bomb": _fault(_explode, encoding="gzip"),
-    "deflate-bomb": _fault(_explode, encoding="deflate"),
-    "gzip-twice-bomb": _fault(_explode, encoding="gzip, gzip"),
+    # Connections that break, and bodies that never end or explode.
+    "reset-midway": Fault(partial(_reset_midway, claimed=0, resets=True)),
+    "short-body": Fault(partial(_reset_midway, claimed=5_000, resets=False)),
+    "no-http": _raw(b"HELO mail.example\r\n\r\n"),
+    "no-head": _raw(b""),
+    "huge-header": _raw(b"HTTP/1.1 200 OK\r\nX: " + b"x" * 200_000 + b"\r\n\r\n"),
+    "bad-chunk": _raw(b"HTTP/1.1 200 OK\r\nTransfer-Encoding: chunked\r\n\r\nxyz\r\n"),
+    "endless": _stream(b" " * 65_536),
+    "endless-gzip": _stream(gzip.compress(b" " * 2**20), Content_Encoding="gzip"),
+    "drip": _stream(b" ", pause_s=0.02),
+    "gzip": _packed(gzip.compress, "gzip", "reply"),
+    "deflate": _packed(zlib.compress, "deflate", "reply"),
+    "gzip-cut": _packed(_half, "gzip"),
+    "gzip-that-is-none": _packed(bytes, "gzip"),
+    "brotli-that-is-none": _packed(gzip.compress, "br"),
+    "gzip-bomb": _bomb("gzip"),
+    "deflate-bomb": _bomb("deflate"),
+    "gzip-twice-bomb": _bomb("gzip, gzip"),
 }
 """Every fault by its name."""

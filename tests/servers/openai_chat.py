@@ -38,8 +38,11 @@ class OpenAIChat(LocalServer):
             else:
                 parts += [content] if isinstance(content, str) else map(_part, content)
         params = {k: v for k, v in body.items() if k not in ("model", "messages", "seed")}
-        key = request.headers.get("Authorization", "").removeprefix("Bearer ")
+        key = self.key_of(request)
         return Seen(body["model"], system, tuple(parts), params, body.get("seed"), key, body)
+
+    def key_of(self, request: web.Request) -> str:
+        return request.headers.get("Authorization", "").removeprefix("Bearer ")
 
     def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
         finish = {"length": "length", "filtered": "content_filter"}.get(ending, "stop")

@@ -22,8 +22,11 @@ class AnthropicMessages(LocalServer):
             content = message["content"]
             parts += [content] if isinstance(content, str) else map(_block, content)
         params = {k: v for k, v in body.items() if k not in ("model", "messages", "system")}
-        key = request.headers.get("x-api-key", "")
+        key = self.key_of(request)
         return Seen(body["model"], system, tuple(parts), params, body.get("seed"), key, body)
+
+    def key_of(self, request: web.Request) -> str:
+        return request.headers.get("x-api-key", "")
 
     def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
         stop = {"length": "max_tokens", "filtered": "refusal"}.get(ending, "end_turn")
@@ -72,8 +75,10 @@ class GeminiGenerate(LocalServer):
         params = dict(body.get("generationConfig", {}))
         seed = params.pop("seed", None)
         model = request.path.rpartition("/")[2].partition(":")[0]
-        key = request.headers.get("x-goog-api-key") or request.query.get("key", "")
-        return Seen(model, system, parts, params, seed, key, body)
+        return Seen(model, system, parts, params, seed, self.key_of(request), body)
+
+    def key_of(self, request: web.Request) -> str:
+        return request.headers.get("x-goog-api-key") or request.query.get("key", "")
 
     def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
         finish = {"length": "MAX_TOKENS", "filtered": "SAFETY"}.get(ending, "STOP")
