@@ -32,7 +32,7 @@ S = TypeVar("S")
 T = TypeVar("T")
 
 SHARED = ("pictures", "goal-blind")
-"""Folders of the cache."""
+"""Folders of the cache: rendered pictures, and what floors reach."""
 COMMAND = (sys.executable, "-m", "phyblock")
 PRICE = {"input": 10.0, "output": 100.0}
 CALL_USD = 1000 * PRICE["input"] / 1e6 + 40 * PRICE["output"] / 1e6
@@ -155,33 +155,25 @@ SCENES: tuple[Raw, ...] = (
 )
 
 
-def shared_folders(pictures: Path) -> list[Path]:
-    """The folder of each of `SHARED` for workspaces that share rendered pictures."""
-    return [pictures, *map(pictures.with_name, SHARED[1:])]
-
-
 def _whole(done: Done) -> Done:
     assert (done.code, done.err) == (0, ""), done.out + done.err
     return done
 
 
 class Workspace:
-    """A folder with `data/`, `suite.yaml` and `models.yaml`, and a reply cache of its own.
-
-    Pictures are shared between workspaces, because each takes a while to draw, and so is what
-    floors reach.
+    """A folder with `data/`, `suite.yaml` and `models.yaml`, and a reply cache of its own, in which
+    the folders `SHARED` are shared between workspaces: to fill them takes a while.
     """
 
     def __init__(self, root: Path, pictures: Path) -> None:
         self.root = root
         self.cache = root / "cache"
-        root.mkdir(parents=True, exist_ok=True)
-        for folder in shared_folders(pictures):
+        is_new = not self.cache.exists()
+        self.cache.mkdir(parents=True, exist_ok=True)
+        for folder in map(pictures.with_name, SHARED):
             folder.mkdir(parents=True, exist_ok=True)
-        if not self.cache.exists():
-            self.cache.mkdir()
-            for name, folder in zip(SHARED, shared_folders(pictures), strict=True):
-                (self.cache / name).symlink_to(folder, target_is_directory=True)
+            if is_new:
+                (self.cache / folder.name).symlink_to(folder)
         self.out = root / "out"
         self.env = {
             "PATH": os.environ["PATH"],
@@ -197,8 +189,7 @@ class Workspace:
         """`data/scenes.jsonl`."""
         folder = self.root / "data"
         folder.mkdir(exist_ok=True)
-        write_lines(folder / "scenes.jsonl", scenes or SCENES)
-        return folder
+        return write_lines(folder / "scenes.jsonl", scenes or SCENES).parent
 
     def write_suite(self, *, name: str = "trial", **fields: Any) -> Path:
         """`suite.yaml`: small pictures, the scenes of `data`, baselines only
@@ -238,23 +229,15 @@ class Workspace:
         bytes_left: int | None = None,
         fresh: bool = False,
     ) -> Done:
-        """Run the command to its end.
-
-        Its process is forked from one that has imported everything, unless it is to be `fresh`:
-        one with a hash seed of its own, and with the interpreter's settings of `env`.
+        """Run the command to its end, in a process that is forked from one that has imported
+        everything, or a `fresh` one: with a hash seed and interpreter's settings of its own.
         """
         words, settings = [*map(str, args)], {**self.env, **(env or {})}
         if not fresh:
             return run_forked(words, self.root, settings, bytes_left)
-        done = subprocess.run(
-            [*COMMAND, *words],
-            cwd=self.root,
-            env=settings,
-            capture_output=True,
-            text=True,
-            timeout=300,
-            stdin=subprocess.DEVNULL,
-        )
+        options: dict[str, Any] = {"capture_output": True, "text": True, "timeout": 300}
+        options |= {"cwd": self.root, "env": settings, "stdin": subprocess.DEVNULL}
+        done = subprocess.run([*COMMAND, *words], **options)
         return Done(done.returncode, done.stdout, done.stderr)
 
     def run(self, *args: str | Path, page: bool = False, **options: Any) -> Done:
@@ -326,9 +309,6 @@ class Workspace:
 
 
 VIEW = [45, 22]
-SHAPES = ["cube", "arch", "cylinder", "cuboid"]
-WITH_PICTURES = ("VP", "CF", "PD", "OR")
-PER_SUBTASK = 4
 
 
 def question(subtask: str, scene: Raw, number: int, rng: np.random.Generator) -> Raw:
@@ -341,12 +321,12 @@ def question(subtask: str, scene: Raw, number: int, rng: np.random.Generator) ->
         "scene_id": scene["id"],
         "wording": f"{subtask.lower()}-1",
         "question": f"A question of kind {subtask}, number {number}, about the red cube?",
-        "options": [str(word) for word in rng.permutation(SHAPES)],
+        "options": [str(word) for word in rng.permutation(["cube", "arch", "cylinder", "cuboid"])],
         "answer": letters[0],
         "pictures": [{"label": "scene", "view": VIEW}],
         "evidence": {"slots": {}},
     }
-    if subtask in WITH_PICTURES:
+    if subtask in ("VP", "CF", "PD", "OR"):
         made["options"] = [f"<img{i}>" for i in range(1, 5)]
         made["pictures"] += [
             {"label": letter, "view": [45 + 35 * place, 25 + number], "framed": True}
@@ -369,7 +349,7 @@ def question(subtask: str, scene: Raw, number: int, rng: np.random.Generator) ->
 
 def questions(
     scenes: Sequence[Raw] = SCENES,
-    per_subtask: int = PER_SUBTASK,
+    per_subtask: int = 4,
     subtasks: Sequence[str] = SUBTASKS,
 ) -> list[Raw]:
     """Questions of every subtask, about the scenes in turn."""
@@ -384,8 +364,7 @@ def questions(
 def write_questions(folder: Path, made: Sequence[Raw] | None = None) -> Path:
     """`questions.jsonl` in a folder."""
     folder.mkdir(exist_ok=True)
-    write_lines(folder / "questions.jsonl", questions() if made is None else made)
-    return folder
+    return write_lines(folder / "questions.jsonl", questions() if made is None else made).parent
 
 
 def vqa_suite(**fields: Any) -> Raw:

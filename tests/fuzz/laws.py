@@ -7,7 +7,6 @@
 """
 
 import contextlib
-import hashlib
 import json
 import os
 import shutil
@@ -25,7 +24,7 @@ from tests.fork_server import Done, run_forked
 from tests.servers.chassis import Seen
 from tests.servers.faults import WIRE_FAULTS
 from tests.servers.openai_chat import OpenAIChat, answered
-from tests.workspace import Workspace, shared_folders
+from tests.workspace import SHARED, Workspace, files_below
 
 CODES = (0, 1, 2, 130)
 _COMPLAINTS = ("error: ", "Error: ")
@@ -51,22 +50,22 @@ class Broken(NamedTuple):
 
 def watched(
     args: Sequence[str],
-    folder: Path,
-    env: Mapping[str, str],
+    workspace: Workspace,
     may_write: Sequence[str],
     lasting: Sequence[str] = (),
     longest_s: float = _LONGEST_S,
 ) -> tuple[Done, list[Broken]]:
     """Run a command to its end, or for its longest time; return its end and the laws it broke.
 
-    `may_write` are the paths in the folder that the command is to write in, and `lasting` those of
-    the user's files that stand there all the same.
+    `may_write` are the paths that the command is to write in, beside the cache, and `lasting` those
+    of the user's files that stand there all the same.
     """
+    folder, may_write = workspace.root, (*may_write, "cache")
     before, lines = _tree(folder), _whole_lines(folder)
     ended = Done(None, "", "")
     with tempfile.TemporaryFile() as file:
         with contextlib.suppress(subprocess.TimeoutExpired):
-            ended = run_forked(args, folder, env, timeout_s=longest_s, deeds=file)
+            ended = run_forked(args, folder, workspace.env, timeout_s=longest_s, deeds=file)
         file.seek(0)
         deeds = [json.loads(line) for line in file]
     found, after = list(_ending_broken(ended)), _tree(folder)
@@ -75,7 +74,8 @@ def watched(
         if not same and (path in lasting or not _lies_in(path, may_write)):
             kind = "changed" if path in before else "made"
             found.append(Broken(2, f"a file was {kind if path in after else 'deleted'}", path))
-    places = [os.path.realpath(folder / place) for place in may_write]
+    shared = [f"cache/{name}" for name in SHARED]
+    places = [os.path.realpath(folder / place) for place in (*may_write, *shared)]
     found += [broken for deed in deeds for broken in _judge(*deed, places)]
     for name, line in lines - _whole_lines(folder):
         detail = line[:300].decode("utf-8", "replace")
@@ -83,17 +83,10 @@ def watched(
     return ended, found
 
 
-def _tree(root: Path) -> dict[str, tuple[str, str]]:
-    """Everything below a folder by relative path; links are not followed."""
-    return {str(path.relative_to(root)): _look(path) for path in root.rglob("*")}
-
-
-def _look(path: Path) -> tuple[str, str]:
-    if path.is_symlink():
-        return "link", os.readlink(path)
-    if path.is_file():
-        return "file", hashlib.md5(path.read_bytes()).hexdigest()
-    return "folder" if path.is_dir() else "other", ""
+def _tree(root: Path) -> dict[str, bool | bytes]:
+    """Everything below a folder by relative path: files and links by what they hold."""
+    below = {str(path.relative_to(root)): path.is_dir() for path in root.rglob("*")}
+    return below | files_below(root)
 
 
 def _ending_broken(ended: Done) -> Iterator[Broken]:
@@ -164,12 +157,10 @@ class Bench:
         made = self._template.copied(self._folder)
         try:
             (made.root / "tmp").mkdir()
+            made.env["TMPDIR"] = str(made.root / "tmp")
             for name, content in case.files.items():
                 _put(made.root / name, content)
-            pictures = (made.cache / "pictures").resolve()
-            places = (*case.may_write, "cache", "tmp", *map(str, shared_folders(pictures)))
-            env = {**made.env, "TMPDIR": str(made.root / "tmp")}
-            ended, found = watched(case.args, made.root, env, places, case.lasting)
+            ended, found = watched(case.args, made, (*case.may_write, "tmp"), case.lasting)
             self.tally["hangs" if ended.code is None else f"code {ended.code}"] += 1
             for broken in found:
                 known = self.found.get(broken.name)
@@ -198,8 +189,11 @@ def _put(path: Path, content: bytes | str | None) -> None:
         path.write_bytes(content)
 
 
-_FINAL = {"400": "sample", "policy": "sample"}
-_REPLIES = ("ok", "length", "filtered", "blank")
+_COMES_TO = {
+    **dict.fromkeys(("ok", "length", "filtered", "blank"), "reply"),
+    **dict.fromkeys(("400", "policy"), "sample"),
+    **{name: fault.ending for name, fault in WIRE_FAULTS.items()},
+}
 
 
 class Entry(NamedTuple):
@@ -212,9 +206,7 @@ class Entry(NamedTuple):
     @property
     def comes_to(self) -> str:
         """ "reply", "retryable", "unavailable" or "sample" (refused for good)."""
-        if self.ending in WIRE_FAULTS:
-            return WIRE_FAULTS[self.ending].ending
-        return "reply" if self.ending in _REPLIES else _FINAL.get(self.ending, "retryable")
+        return _COMES_TO.get(self.ending, "retryable")
 
     @property
     def key(self) -> tuple[str, str]:

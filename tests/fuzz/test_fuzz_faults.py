@@ -33,7 +33,7 @@ from tests.servers.batches import AnthropicBatches, BatchFaults, GeminiBatches, 
 from tests.servers.chassis import Faults, Running
 from tests.servers.faults import WIRE_FAULTS
 from tests.servers.openai_chat import OpenAIChat
-from tests.workspace import PRICE, SCENES, SHARED, questions, vqa_suite, write_questions
+from tests.workspace import PRICE, SCENES, questions, vqa_suite, write_questions
 
 pytestmark = pytest.mark.fuzz
 
@@ -73,10 +73,8 @@ def prepare(workspace, url, track, transport, seeds):
 
 def run(workspace, *args):
     """Run the suite of a workspace, which holds the laws of commands."""
-    shared = [str((workspace.cache / name).resolve()) for name in SHARED]
-    places = (workspace.out.name, "cache", *shared)
     words = ["run", "suite.yaml", "--out", str(workspace.out), "--no-report", "--yes", *args]
-    ended, broken = watched(words, workspace.root, workspace.env, places, longest_s=_LONGEST_S)
+    ended, broken = watched(words, workspace, [workspace.out.name], longest_s=_LONGEST_S)
     holds(broken)
     return ended
 
