@@ -127,10 +127,9 @@ class Score:
 
     @property
     def value(self) -> float:
-        """The headline measure, in [0, 1]: 1 or 0 for an answer, F1 for all other tracks.
+        """The headline measure in [0, 1]: 1 or 0 for an answer, else F1, or 0 if it is not defined.
 
-        F1 is in setting C for a plan with poses, and over all attempts for an episode. The value
-        is 0 where F1 is not defined.
+        F1 is in setting C for a plan with poses, and over all attempts for an episode.
         """
         return self._value(self.measure) or 0.0
 
@@ -273,10 +272,7 @@ class Task:
         return None if form is None else form.schema
 
     def score(self, reply: str | Sequence[str] | None) -> Score:
-        """Return the score of a reply, of an episode's replies in order, or of no reply (None).
-
-        Raises SpecError for anything else.
-        """
+        """Score one reply, an episode's in order, or None. Raises SpecError for anything else."""
         if self.plays and (reply is None or isinstance(reply, Sequence)):
             episode = Episode(self, shows=False)
             for one in [reply] if isinstance(reply, str) else reply or ():
@@ -321,15 +317,11 @@ class Turn(NamedTuple):
 class Episode:
     """A task of several turns, driven by replies. Use it from one thread.
 
-    Rewards are differences of `Score.value`, so that they sum to that of the whole episode.
-    `request` is the pending one, None at the end.
+    Rewards are differences of `Score.value`, so they sum to it. `request` is None at the end.
     """
 
     def __init__(self, task: Task, *, shows: bool = True) -> None:
-        """Begin; without `shows`, no pictures are drawn and messages are empty.
-
-        Raises SpecError for a task without episodes.
-        """
+        """Begin. Without `shows`, messages are empty. Raises SpecError if `task` has one turn."""
         if not task.plays:
             raise SpecError(Problem(task.id, "is asked once and has no episode"))
         self.task, self._shows = task, shows
@@ -383,8 +375,7 @@ class Episode:
 class Tasks:
     """The tasks of a track in one split: a finite set, by place or key, or an endless stream.
 
-    Each iteration of a stream starts at its beginning. Tasks of a stream are made on demand, each
-    with its own track, so that nothing is kept of finished ones.
+    Each iteration of a stream starts at its beginning; its tasks are made on demand and not kept.
     """
 
     suite: Suite
@@ -459,12 +450,11 @@ def tasks(
 ) -> Tasks:
     """Return the tasks of a track: `full_planning`, `step_planning`, `pose_planning` or `vqa`.
 
-    The split `test` is the built-in set, or `data`: a data set's name or folder, or scenes. `train`
-    and `dev` are made from the seed and share no structure with the test set or with one another;
-    they are endless and begin at place `first`, unless `limit` makes them a finite set of that many
-    scenes. `overrides` are `KEY=VALUE` texts for the track's bundled suite, as for `--set`. In the
-    test set, `limit` keeps that many items, spread over levels or subtasks. Raises SpecError,
-    DataError or PromptError with all problems.
+    The split `test` is the built-in set, or `data`: the name or folder of a data set, or scenes;
+    `limit` keeps that many of its items, spread over levels or subtasks. `train` and `dev` are made
+    from the seed and share no structure with the test set or with one another; they are endless and
+    begin at place `first`, unless `limit` makes them a finite set of that many scenes. `overrides`
+    are `KEY=VALUE` texts for the track's bundled suite. Raises SpecError, DataError or PromptError.
     """
     if split != "test" and (data is not None or track == "vqa"):
         message = "takes no data" if data is not None else "has no questions"
@@ -537,8 +527,7 @@ def generate(
 ) -> dict[str, AssemblyTask]:
     """Return new scenes with candidates, by id, made as by `phyblock scenes generate`.
 
-    Each stands, and none has the structure of a built-in one. Raises DataError where the rules give
-    too few.
+    All stand, and none has the structure of a built-in one. Raises DataError if there are too few.
     """
     kinds = PALETTES[palette]
     with open_workers() as workers:
@@ -583,8 +572,7 @@ def render(
 
 @checked
 def load_suite(suite: Place, *overrides: str) -> Suite:
-    """Read a suite: a YAML file, or the name of a bundled one; `overrides` are `KEY=VALUE` texts,
-    as for `--set`.
+    """Read a suite from a YAML file, or a bundled one by its name, with `KEY=VALUE` overrides.
 
     Raises SpecError with all problems, each with its file, line and field.
     """
@@ -610,9 +598,8 @@ def run_suite(
     called only with `yes`, or under a limit of the suite (`limits.max_cost_usd`). Warns of models
     that were stopped, and of samples that are left, rejected or not judged.
 
-    Raises InputError for invalid input, before any call. When interrupted, the run sends nothing
-    more, waits for calls in progress (not after a second interrupt), and raises KeyboardInterrupt
-    once all replies are on disk.
+    Raises InputError for invalid input before any call. An interrupt ends sending, waits for calls
+    in progress (unless it comes twice), and raises KeyboardInterrupt once all replies are on disk.
     """
     loaded = suite if isinstance(suite, Suite) else load_suite(suite)
     named = None if models_file is None else str(models_file)

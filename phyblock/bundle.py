@@ -69,9 +69,8 @@ _NEVER_VERIFIED = (
 class Verified:
     """A bundle that was scored again.
 
-    `folder` is its run, with the data of this machine, while it is open; `records` is the number of
-    records, `expected` the number of samples of a complete run; `unverified` are sentences on what
-    was not checked.
+    `folder` is its run with this machine's data, while it is open; `records` and `expected` are the
+    numbers of records and of samples of a complete run; `unverified` says what was not checked.
     """
 
     phyblock: str
@@ -83,10 +82,7 @@ class Verified:
 
 
 def bundle_run(folder: Path, out: Path | None = None) -> Path:
-    """Write a bundle of the run in `folder`, the same bytes for the same run, and return its path.
-
-    Raises StoreError for a folder that is no run, or a file that cannot be written.
-    """
+    """Write a bundle of the run in `folder`; return its path. Raises StoreError if that fails."""
     manifest = read_manifest(folder)
     records = record_lines(map(portable, read_records(folder, manifest)))
     members = {MANIFEST: [dump_yaml(portable_manifest(manifest).fields())], RECORDS: records}
@@ -105,10 +101,7 @@ def bundle_run(folder: Path, out: Path | None = None) -> Path:
 
 
 def add(archive: zipfile.ZipFile, name: str, lines: Iterable[str]) -> str:
-    """Write a member, whose bytes depend only on the lines and zlib; return its SHA-256.
-
-    Raises StoreError if it is too large to be read back.
-    """
+    """Write a member; return its SHA-256. Raises StoreError if it is too large to be read back."""
     info, digest = zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0)), hashlib.sha256()
     info.compress_type, info.create_system = zipfile.ZIP_DEFLATED, 3
     left = MEMBERS[name]
@@ -211,10 +204,7 @@ def portable(record: Record) -> Record:
 
 
 def unpack(path: Path, folder: Path) -> str:
-    """Unpack the bundle at `path` into `folder`; return the version of phyblock that made it.
-
-    Raises StoreError if it is not a bundle, or was changed after it was made.
-    """
+    """Unpack a bundle; return its version of phyblock. Raises StoreError if it is broken."""
     try:
         with open_regular(path) as file:
             if file.seek(0, io.SEEK_END) > _LARGEST_BYTES:

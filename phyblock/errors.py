@@ -105,18 +105,15 @@ class StoreError(InputError):
 
 Sent = Literal["no", "lost", "maybe", "answered"]
 """Progress of a failed call: nothing was sent; the connection was lost; it was sent, or may have
-been, but not answered in time; the server answered.
-"""
+been, but not answered in time; the server answered."""
 
 
 class ModelError(PhyblockError):
     """A call to a model failed; the message is safe to store (it holds no key).
 
-    `status` is the HTTP status of the server's answer, if any; `sent` is the progress of the call,
-    which decides about retries and cost; `retry_after_s` is what the server asks for.
-
-    `billed_usd` is what a run's cost limit counts for it [US dollars], all attempts included; None
-    where there is no limit.
+    `status` is the HTTP status, if the server answered; `sent` the progress of the call, which
+    decides about retries and cost; `retry_after_s` what the server asks for; `billed_usd` what a
+    run's cost limit counts for all attempts [US dollars], None without a limit.
     """
 
     def __init__(

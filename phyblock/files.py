@@ -192,10 +192,7 @@ def _no_picture(where: str, error: Exception, found: str = "") -> DataError:
 
 @contextlib.contextmanager
 def writing(path: Path, hint: str = "") -> Iterator[None]:
-    """Turn OSErrors while `path` is written into a StoreError that names it.
-
-    `path` is the file, or the folder where many files are written; `hint` says what to do.
-    """
+    """Turn OSErrors of writing a file or folder into a StoreError that names it, with a `hint`."""
     try:
         yield
     except (OSError, UnicodeEncodeError) as error:
@@ -220,10 +217,9 @@ def make_folder(path: Path, hint: str = "") -> None:
 def atomic_write(path: Path, data: bytes | str | Iterable[bytes], *, sync: bool = False) -> None:
     """Write a whole file, or leave the old one and no other file.
 
-    Pieces of data are written as they come. Text is written as UTF-8, with question marks for
-    lone surrogates. If `path` is a link, the link is replaced and its target is unchanged. With
-    `sync` the file survives a crash of the machine. Raises OSError if the disk fails: see
-    `writing`.
+    Pieces of data are written as they come, text as UTF-8 with question marks for lone surrogates.
+    If `path` is a link, the link is replaced and its target is unchanged. With `sync` the file
+    survives a crash of the machine. Raises OSError if the disk fails: see `writing`.
     """
     # A unique name: two processes may write the same file at the same time.
     partial = path.with_name(f".{uuid4().hex}.part")
@@ -317,10 +313,7 @@ class OutFolder:
         self.path = path
 
     def check(self, names: Iterable[str]) -> None:
-        """Raise StoreError if links, or files that phyblock did not write, prevent writing `names`.
-
-        Nothing is written.
-        """
+        """Raise StoreError if links, or files of others, prevent writing `names`."""
         # Existing files are found first: another process lists a name before it writes the file.
         there = {n: os.path.lexists(self.path / n) and not n.endswith("/") for n in names}
         known = self._known()
@@ -370,10 +363,7 @@ class OutFolder:
         return sorted(name for name in self._known() if name.startswith(below))
 
     def remove(self, names: Iterable[str]) -> None:
-        """Remove those of `names` that phyblock wrote, and folders that are empty then.
-
-        Nothing else in an output folder is ever removed. Raises StoreError if the disk fails.
-        """
+        """Remove those of `names` that phyblock wrote, and emptied folders. Raises StoreError."""
         known = self._known()
         for name in (name for name in names if name in known):
             path, folders = self.path / name, self._folders(name)
@@ -389,8 +379,7 @@ class OutFolder:
     def making(self, below: str) -> Iterator[Path]:
         """Yield a temporary folder, whose files are moved to the folder `below` at the end.
 
-        If the body fails, nothing is left of its files. Raises StoreError as `check`, and OSError
-        if the disk fails: see `writing`.
+        If the body fails, its files are removed. Raises as `check`, and OSError if the disk fails.
         """
         self.claim([])
         with tempfile.TemporaryDirectory(".part", ".", self.path) as part:

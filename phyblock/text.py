@@ -1,6 +1,4 @@
-"""Foreign text (names, replies, paths), made safe to show and store; digests, draws and sums that
-are the same on every machine and every Python.
-"""
+"""Foreign text made safe to show and store; digests, draws and sums equal on every machine."""
 
 from __future__ import annotations
 
@@ -62,9 +60,8 @@ def did_you_mean(word: str, known: Iterable[str]) -> str:
 def csv_cell(value: object) -> object:
     """Return a value as a cell of a CSV file that a spreadsheet never takes for a formula.
 
-    Text that begins with `=`, `+`, `-`, `@`, a tab or a line break gets an apostrophe before it;
-    so does text that begins with apostrophes and then one of these, so that one apostrophe taken
-    away gives back what was there. Numbers, as numbers or as text, stay as they are.
+    Text that begins with `=`, `+`, `-`, `@`, a tab or a line break, even after apostrophes, gets an
+    apostrophe before it, so that removing one restores it. Numbers, also as text, stay as they are.
     """
     if isinstance(value, str) and _FORMULA.match(value) and not _NUMBER.fullmatch(value):
         return f"'{value}"

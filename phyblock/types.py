@@ -1,7 +1,4 @@
-"""Literal types that suites, records, rules and the command line share.
-
-Types that only one track uses are in its module, those of blocks and questions in the domain.
-"""
+"""Literal types that suites, records, rules and the command line share."""
 
 from __future__ import annotations
 
@@ -28,17 +25,15 @@ AnswerFormat = Literal["text", "json_schema"]
 """Form of answers: lines of text, or JSON that follows a schema."""
 
 Gating = Literal["aov", "layer"]
-"""Condition under which a block can be placed: all it rests on is placed, or all lower layers are
-complete."""
+"""Condition for placing a block: what it rests on is placed, or all lower layers are complete."""
 GATINGS: tuple[Gating, ...] = get_args(Gating)
 Physics = Literal["off", "settle", "strict"]
 """Simulation of every new state, and the effect of a collapse."""
 
 StepEnd = Literal["stands", "falls", "knocks_over", "overlaps", "under_floor", "no_block"]
-"""Ending of an executed step. `stands`: the block and all others stay where they were. `falls`:
-the block does not. `knocks_over`: others do not. `overlaps`, `under_floor`: the block was refused.
-`no_block`: no candidate has this number.
-"""
+"""Ending of an executed step. `stands`: the block and all others stay where they were. `falls`: the
+block does not. `knocks_over`: others do not. `overlaps`, `under_floor`: the block was refused.
+`no_block`: no candidate has this number."""
 STEP_ENDS: tuple[StepEnd, ...] = get_args(StepEnd)
 REFUSED_ENDS: tuple[StepEnd, ...] = ("overlaps", "under_floor", "no_block")
 """Endings of steps whose block is not there afterwards."""

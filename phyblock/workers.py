@@ -95,16 +95,12 @@ class Workers:
 class Shards:
     """Batches in a folder that several programs share, each as one shard.
 
-    Of `count` shards, each begins with every `count`-th batch, reads what others have computed, and
-    computes what nobody computes. So shards end whether they run at once or one after another, and
-    continue where they were interrupted.
+    Each of `count` shards begins with every `count`-th batch, reads what others have computed, and
+    computes what nobody does. So shards may run at once or one after another, and be interrupted.
     """
 
     def __init__(self, folder: Path, number: int, count: int, work: str) -> None:
-        """Start or continue; `work` describes the job, and must be the same in all shards.
-
-        Raises StoreError if the folder belongs to another job.
-        """
+        """Start or continue the job `work`. Raises StoreError if the folder is another job's."""
         self.number, self.count, self._folder = number, count, folder.absolute()
         make_folder(folder)
         path = folder / "work.txt"
@@ -162,7 +158,6 @@ class _SharedBatch:
                 self.started.add_done_callback(lambda _: lock.close())
 
     def result(self) -> Any:
-        """Return the answers."""
         if self.started is None:
             self.start(waits=True)
         return self.started.result() if self.started else pickle.loads(self.path.read_bytes())

@@ -65,8 +65,7 @@ _OWN_BODY = (
 def is_address(url: str) -> bool:
     """True if a model can be called at this address, which has no user, query or fragment.
 
-    Addresses are stored in run folders and the reply cache and shown in messages. So they must not
-    contain secrets, and a refused one is not shown.
+    Addresses are stored and shown, so they must hold no secret; a refused one is not shown.
     """
     has_form = re.fullmatch(r"(?i)https?://[^\s/@]+(/[!-~]*)?", url)
     if not has_form or len(url) > 1000 or not url.isprintable() or set(url) & set("?#\\"):
@@ -105,11 +104,9 @@ class Price(Section):
     output: Cost
     """Reply tokens [USD per million]."""
     cached: Cost | None = None
-    """Prompt tokens that the provider reads from its cache [USD per million]; null: the price of
-    input."""
+    """Prompt tokens read from the provider's cache [USD per million]; null: the price of input."""
     cache_write: Cost | None = None
-    """Prompt tokens that the provider writes to its cache [USD per million]; null: the price of
-    input."""
+    """Prompt tokens written to the provider's cache [USD per million]; null: the price of input."""
 
 
 class Tariff(Price):
@@ -160,8 +157,7 @@ class ModelConfig(Section):
     """One model: its address and parameters.
 
     Exactly one of `id` and `replay` is given; a built-in baseline and a person have only a name. A
-    missing field takes the suite's value (`with_defaults`); a sampling parameter that is null is
-    not sent.
+    missing field takes the suite's value (`with_defaults`).
     """
 
     model_config = ConfigDict(
@@ -182,8 +178,7 @@ class ModelConfig(Section):
     """Name of the weights, if the id does not identify them. Two servers with the same id count as
     the same model, unless their revisions differ."""
     api_key_env: _Variable | None = None
-    """Name of the environment variable that holds the key, if it is not the provider's usual one.
-    Never the key itself."""
+    """Environment variable that holds the key, if not the provider's usual one; never the key."""
     transport: Literal["auto", "litellm", "direct"] = "auto"
     """litellm: through the library. direct: plain HTTP, for servers that speak the OpenAI chat
     protocol. auto: direct if possible."""
@@ -218,9 +213,8 @@ class ModelConfig(Section):
     price: Tariff | None = None
     """Price; null: that of litellm's price map, else unknown."""
     seed: Literal["auto", "always", "never"] = "auto"
-    """auto: seeds are sent if litellm knows that the provider accepts them, and to
-    OpenAI-compatible servers named by api_base. always, never: sent, or not, in any case. Without
-    seeds, repeats are independent."""
+    """auto: sent if litellm knows that the provider accepts seeds, and to servers named by
+    api_base. always, never: sent, or not, in any case. Without seeds, repeats are independent."""
     response_format: Literal["auto", "always", "never"] = "auto"
     """With answer_format: json_schema in the suite. auto: the schema is sent if litellm knows that
     the model accepts one, and to OpenAI-compatible servers named by api_base. always, never: sent,
@@ -232,8 +226,7 @@ class ModelConfig(Section):
     size_b: TimeoutS | None = None
     """Parameters [billions], if known."""
     groups: Unique[_Group] = ()
-    """Its groups: group:NAME in a suite or in --models means all models of a group, in the order of
-    this file."""
+    """Its groups; group:NAME in a suite or --models means all models of a group, in file order."""
     replay: Text | None = None
     """Folder of recorded replies to use instead of an id, relative to this file."""
 
@@ -295,8 +288,7 @@ class ModelConfig(Section):
     def is_direct(self) -> bool:
         """True if calls go straight to the server instead of through litellm.
 
-        With `auto`, these are calls to an OpenAI-compatible server named by `api_base`, unless
-        litellm renames parameters for the model.
+        With `auto`: to a server named by `api_base`, unless litellm renames the model's parameters.
         """
         if self.transport != "auto":
             return self.transport == "direct"
@@ -413,8 +405,7 @@ def resolve_models(
 ) -> dict[str, ModelConfig]:
     """Return the models of these names in their order, with groups replaced by their members.
 
-    Raises SpecError for each name that is not a model, a group or a built-in baseline, at its place
-    in the list.
+    Raises SpecError, at its place, for a name that is no model, group or built-in baseline.
     """
     named = {**{name: ModelConfig(name=name) for name in baseline_names()}, **known}
     groups = dict.fromkeys(group for config in known.values() for group in config.groups)

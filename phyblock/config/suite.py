@@ -68,8 +68,7 @@ FACTORS: Mapping[str, tuple[str, ...]] = {
     "layout": ("images", "layout"),
     REPEAT: (),
 }
-"""Factors of `vary` with the path of the field that each sets; that of the prompt depends on the
-track."""
+"""Factors of `vary` with the path of the field they set; the prompt's depends on the track."""
 
 Prompt = Literal["default", "official"] | Template
 Seed = Annotated[int, Field(strict=True, ge=0, le=2**31 - 1)]
@@ -110,13 +109,11 @@ class DatasetSpec(Section):
     """The scenes of a run."""
 
     format: DataFormat = "builtin"
-    """builtin: the project's own format. official: a checkout of the official PhyBlock
-    repository."""
+    """builtin: the project's format. official: a checkout of the official PhyBlock repository."""
     path: Text | None = None
     """builtin: the name of a bundled data set (default: phyblock-400) or a folder that holds
-    scenes.jsonl (write ./name for a folder beside the suite). official: the checkout's folder.
-    Relative to the suite file, or to the working directory if given by --set; ~ and $VARIABLES are
-    expanded."""
+    scenes.jsonl (./name if it is beside the suite). official: the checkout's folder. Relative to
+    the suite file, or with --set to the working directory; ~ and $VARIABLES are expanded."""
     difficulty: DifficultySpec = DifficultySpec()
     """Ranges of difficulty measures that select scenes."""
 
@@ -161,8 +158,7 @@ class ScoringSpec(Section):
     """Criterion of Level 1. selection: one-to-one, order ignored. membership: the criterion of the
     paper's Level-1 columns. aov: as at the other levels."""
     missing: Literal["count", "skip"] = "count"
-    """Missing replies. count: their blocks count as not placed. skip: the scene is excluded, as in
-    the paper."""
+    """count: a missing reply placed no block. skip: its scene is excluded, as in the paper."""
 
 
 class LimitsSpec(Section):
@@ -218,8 +214,7 @@ Levels = Annotated[Unique[LevelT], checked(_lone_level)]
 
 
 class VarySpec(Section):
-    """Conditions of presentation that are varied; the first level of each factor is the
-    reference."""
+    """Varied conditions of presentation; the first level of each factor is the reference."""
 
     prompt: Levels[Prompt] = ()
     """Prompts, as in the track's own field; for suites of one track."""
@@ -232,8 +227,7 @@ class VarySpec(Section):
     layout: Levels[Literal["composite", "separate"]] = ()
     """Layouts of pictures, as images.layout."""
     repeats: Annotated[int, Field(strict=True, ge=1, le=100)] = 1
-    """Number of times that each request is sent, each with another seed. Only the first may be
-    answered from the cache."""
+    """Times that each request is sent, with other seeds; only the first may come from the cache."""
 
     def faults(self) -> Iterator[Fault]:
         """Yield a fault if two templates would have the same name in tables."""
@@ -275,9 +269,8 @@ class VarySpec(Section):
 class SuiteFiles:
     """The file of a suite, and the files that it names.
 
-    `path` is the suite's own; `dataset` the absolute folder of the data set; `folders` are those of
-    tracks with their own data, and `templates` prompts that are files, by track and the prompt's
-    text in the suite.
+    `path` is the suite's own, `dataset` the data set's absolute folder, `folders` those of tracks
+    with their own data, and `templates` prompt files by track and the prompt's text in the suite.
     """
 
     path: Path
@@ -300,8 +293,7 @@ class Suite(Section):
     levels: UniqueSome[Level] = (1, 2, 3, 4)
     """Difficulty levels; only generated scenes have level 5."""
     limit: Count | None = None
-    """Maximum number of items of each track, spread over levels or subtasks; null: all. --limit
-    overrides it."""
+    """Most items per track, spread over levels or subtasks; null: all. --limit overrides it."""
     settings: UniqueSome[Setting] = ("A", "B")
     """A compares type, color and orientation, B type and color. Each reply is scored under all."""
     seeds: UniqueSome[Seed] = (0,)
@@ -313,8 +305,7 @@ class Suite(Section):
     """Built-in baselines that are scored with the models of full_planning, if every track of the
     suite has them; they cost nothing. []: none. A run with only baselines has those it names."""
     prompt: Prompt = "default"
-    """default; official (read from the official checkout); or the path of a .j2 template, relative
-    to the suite file."""
+    """default, official (from the official checkout), or a .j2 template, relative to the suite."""
     answer_format: AnswerFormat = "text"
     """text: lines of text. json_schema: one JSON object, whose schema the prompt describes; it is
     also sent as response_format if the provider accepts one."""
@@ -327,8 +318,7 @@ class Suite(Section):
     sampling: SamplingSpec = SamplingSpec()
     limits: LimitsSpec = LimitsSpec()
     vary: VarySpec = VarySpec()
-    """Conditions of presentation that are varied, to measure how much each of them changes a
-    model's score."""
+    """Conditions of presentation to vary, to measure how much each changes a model's score."""
 
     _files: SuiteFiles = PrivateAttr()
 
@@ -472,9 +462,8 @@ def load_suite(
 ) -> Suite:
     """Read, override and validate a suite.
 
-    `overrides` are "key=value" texts. A file in one of `prompt_dirs` with the name of a bundled
-    prompt replaces it where the suite says `default`. Raises SpecError with all problems, in the
-    order of the file.
+    `overrides` are "key=value" texts. A file in `prompt_dirs` with the name of a bundled prompt
+    replaces it for `default`. Raises SpecError with all problems, in the order of the file.
     """
     source = read_yaml(path)
     apply_overrides(source, overrides)

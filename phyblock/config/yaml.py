@@ -98,10 +98,7 @@ class Place(NamedTuple):
 
 @dataclass
 class YamlSource:
-    """A YAML document: its data, and the places of its parts in the order of the file.
-
-    Overrides come last.
-    """
+    """A YAML document: its data, and the places of its parts in file order, overrides last."""
 
     label: str
     data: Any = None

@@ -60,8 +60,7 @@ class ManifestModel(Line):
     served_at: tuple[str, ...] = ()
     """Addresses of your own servers at which it was called when the run began."""
     kind: str = ""
-    """`litellm`: called over the network; `replay`: a recording; `baseline`: a rule; `human`: a
-    person."""
+    """`litellm`: over the network; `replay`: a recording; `baseline`: a rule; `human`: a person."""
 
     @property
     def is_baseline(self) -> bool:
@@ -106,8 +105,7 @@ class Manifest(Line):
     """The description of a run, written before any request."""
 
     identity: str
-    """Digest of everything that determines the results; only the same run can continue in a
-    folder."""
+    """Digest of all that determines the results; only the same run can continue in a folder."""
     created: str = ""
     """Time of its start, UTC."""
     format: Annotated[int, Field(ge=1, le=FORMAT)] = FORMAT
@@ -122,8 +120,7 @@ class Manifest(Line):
     dataset: ManifestDataset | None = None
     """The data set."""
     tracks: dict[str, dict[str, Any]] = Field(default_factory=dict)
-    """Digests of everything that determines the results of each track: prompt, pictures,
-    questions."""
+    """Digests by track of all that determines results: prompt, pictures, questions."""
     variants: dict[str, dict[str, dict[str, Any]]] = Field(default_factory=dict)
     """The same digests by condition, as named in records, and track; empty: only one condition."""
     limit: int | None = None

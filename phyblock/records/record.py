@@ -69,10 +69,7 @@ Usd = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 def validated(
     kind: type[LineT], raw: object, source: YamlSource | str, base: FieldPath = ()
 ) -> LineT:
-    """Return decoded data as a line. Raises DataError with all problems.
-
-    The data is at `base` in a YAML source, or all at one place.
-    """
+    """Return data at `base` of a source as a line. Raises DataError with all problems."""
     try:
         return kind.model_validate(raw)
     except ValidationError as error:
@@ -329,8 +326,7 @@ class Record(Line):
     error: StoredError | None
     """The error; null: none."""
     prompt: SentPrompt | None = None
-    """The prompt; null for recordings and baselines, which get none. For an episode, that of the
-    first turn."""
+    """The prompt, in an episode that of the first turn; null for recordings and baselines."""
     parse: Any = None
     """The parsed answer, in the form of its track; null: none."""
     scores: tuple[Score, ...]
@@ -447,9 +443,7 @@ class Record(Line):
 
     @property
     def paid_usd(self) -> float | None:
-        """Cost of its replies to the run [US dollars]; None if a price is unknown. Replies from
-        the cache were paid for by other runs; an episode can hold both kinds.
-        """
+        """Cost of replies that are not from the cache [US dollars]; None if a price is unknown."""
         paid = [reply.cost_usd for reply in self.replies if not reply.cached]
         known = [cost for cost in paid if cost is not None]
         return plain_sum(known) if len(known) == len(paid) else None
@@ -480,8 +474,7 @@ class Call(Line):
     ended: bool = False
     """True if its end is known: a reply, or an error."""
     billed_usd: Usd | None = None
-    """Its cost [US dollars], or the highest possible one if that is unknown; null: the price is
-    unknown."""
+    """Its cost [US dollars], or the highest possible if unknown; null: the price is unknown."""
     reply: Reply | None = None
     """The reply as it arrived, before it was judged; null: none."""
 
@@ -534,8 +527,7 @@ class BatchLine(Line):
 
 
 class Stopped(Line):
-    """The reasons why the last session on a run did not finish; the file exists only if there are
-    any."""
+    """Reasons why the last session on a run did not finish; the file exists only if it has any."""
 
     models: dict[str, str] = Field(default_factory=dict)
     """The reasons why models were stopped, by name."""

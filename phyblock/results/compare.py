@@ -113,9 +113,8 @@ def sides_of(run: Run, models: Sequence[str] = ()) -> list[Side]:
 class Samples:
     """Counts of the samples that several sides have in a part of a track.
 
-    `keys` has a row for each scene, item, seed and variant, ascending; `cell` is the place of its
-    cell among the pooled ones; `counts` (sides, keys, columns) are NaN where a side has no such
-    sample.
+    `keys` has a row per scene, item, seed and variant, ascending; `cell` is the place of its cell
+    among the pooled ones; `counts` (sides, keys, columns) are NaN where a side has no sample.
     """
 
     keys: pd.DataFrame
@@ -128,9 +127,7 @@ class Samples:
         return ~np.isnan(self.counts[:, :, 0])
 
     def values(self, measure: Measure) -> list[pd.Series]:
-        """Return for each side the values of its samples by scene, item, seed and variant, NaN
-        where a value is not defined.
-        """
+        """Return each side's values by scene, item, seed and variant, NaN where not defined."""
         index, of_sides = (
             pd.MultiIndex.from_frame(self.keys),
             zip(self.counts, self.has, strict=True),
@@ -236,10 +233,7 @@ class Comparable:
 
 
 def comparable(run: Run, track: str, measure: str = "") -> Comparable:
-    """Return a measure of a track of a run, by default the main one, prepared for comparisons.
-
-    Raises SpecError for a measure that the track does not have.
-    """
+    """Return a measure, by default the main one, for comparisons. Raises SpecError if unknown."""
     known = {one.name: one for one in track_measures(track)}
     if measure and measure not in known:
         message, allowed = "has no such measure", ", ".join(known)
@@ -345,8 +339,7 @@ def compare_pairs(
 
     `ranked` sides, every pair of which is among `pairs`, get ranks by the last part. Setting,
     matcher, criteria and the policy on missing replies are those of the first run. Raises SpecError
-    if a run was scored differently, asked other questions, or has other blocks in a scene of the
-    same name.
+    if a run was scored differently, asked other questions, or has other blocks in a scene.
     """
     sides = list(dict.fromkeys(side for pair in pairs for side in pair))
     runs = list({id(side.run): side.run for side in sides}.values())
@@ -392,10 +385,7 @@ def _verdict(row: Mapping[Any, Any], measure: Measure, n_tests: int) -> str:
 
 
 def rank_ranges_of(sides: Sequence[Side], track: str) -> dict[str, tuple[int, int]]:
-    """Return the best and the worst rank in a track of all ranked sides, by label.
-
-    Raises SpecError for runs that cannot be compared.
-    """
+    """Return best and worst ranks of all ranked sides, by label. Raises SpecError as `compare`."""
     ranked = with_rank(sides, track)
     if len(ranked) < 2:
         return {side.label: (1, 1) for side in ranked}
@@ -490,10 +480,7 @@ def ranks_view(found: Comparison) -> TextTable:
 
 
 def write_comparison(found: Comparison, folder: Path) -> tuple[Path, ...]:
-    """Write comparison (.csv, .md, .tex) and ranks.csv into `folder`.
-
-    Raises StoreError if they cannot be written.
-    """
+    """Write comparison (.csv, .md, .tex) and ranks.csv. Raises StoreError if that fails."""
     files = compare_view(found).files("comparison")
     files |= {"ranks.csv": to_csv(found.ranks, "%.6f")}
     return OutFolder(folder).write(files)
@@ -510,8 +497,7 @@ def sensitivity_frame(run: Run) -> pd.DataFrame:
 
     `shift` is the standard deviation of the means of the `levels` of a factor; `shift_lo` and
     `shift_hi` bound its 95 % interval over the `n_clusters` base scenes of the `n_items` items that
-    the model answered under every condition. See `phyblock.scoring.statistics`. Repeats are no
-    factor. Empty if the run varies nothing.
+    the model answered under every condition. Repeats are no factor. Empty if nothing varies.
     """
     rows: list[tuple[object, ...]] = []
     suite, parents = run.design.suite, base_scenes(run)
@@ -558,9 +544,7 @@ def sensitivity_table(run: Run) -> TextTable | None:
 
 
 def sizes_text(table: pd.DataFrame) -> str:
-    """Return the numbers of items and base scenes behind rows of `sensitivity_frame`, from the
-    model with the fewest to the one with the most.
-    """
+    """Return the range over models of the numbers of items and base scenes behind these rows."""
     ends = [(int(table[name].min()), int(table[name].max())) for name in ("n_items", "n_clusters")]
     items, scenes = (f"{a}" if a == b else f"{a} to {b}" for a, b in ends)
     return f"{items} items of {scenes} base scenes"

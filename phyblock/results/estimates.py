@@ -58,9 +58,8 @@ def counted_rows(
 ) -> Rows:
     """Return the counts of a track's samples in these cells.
 
-    Samples that the design's policy on missing replies excludes (by default that of the run) are
-    not among them, nor is any other sample of their group. Raises StoreError if the number of
-    stored counts is not that of the measure.
+    Samples that the design's policy on missing replies excludes (by default the run's) are left out
+    with their group. Raises StoreError if the number of stored counts is not the measure's.
     """
     design = design or run.design
     records = run.records[run.records["track"] == track]
@@ -122,8 +121,7 @@ def track_estimates(run: Run, track: str) -> pd.DataFrame:
     own unit; `mean`, `sd` (ddof = 1), `least` and `most` are over the values of the `seeds` single
     seeds. `lo` and `hi` bound a 95 % interval and `se` is the standard error, from leaving out the
     `n_clusters` base scenes that the `n_scenes` scenes were made from; a scene's seeds stay
-    together. If a model gave no reply at all in a cell, its values are NaN. The frame is cached and
-    must not be changed.
+    together. Values of a model without replies in a cell are NaN. Do not change the frame.
     """
     if track in run.made:
         return run.made[track]

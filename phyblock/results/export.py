@@ -78,8 +78,7 @@ def _row(
 def write_csv(run: Run, folder: Path) -> tuple[Path, ...]:
     """Write the rows of a run as `records.csv`, lists as JSON; return its path.
 
-    Raises StoreError if the folder cannot be written or holds a file of that name that phyblock did
-    not write.
+    Raises StoreError if it cannot be written, or would replace a file that is not phyblock's.
     """
     frame = export_frame(run)
     for name in ("levels", "parents", "plan"):

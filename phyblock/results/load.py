@@ -56,10 +56,7 @@ _TYPES = {
 
 
 def track_measures(track: str) -> tuple[Measure, ...]:
-    """Return the measures of a track, then those that plugins added.
-
-    Raises ValueError if two measures, or two kinds of counts, have the same name.
-    """
+    """Return a track's measures, then those of plugins. Raises ValueError for repeated names."""
     measures = (*kind_of(track).report().measures, *added_measures(track))
     for named in (measures, {measure.counted for measure in measures}):
         names = [one.name for one in named]
@@ -131,8 +128,7 @@ def _row(record: Record, start: int) -> tuple[Any, ...]:
 class Design:
     """The plan of a run from its `run.yaml`, which determines the rows and columns of tables.
 
-    `items` is the number of items of each track. The first matcher and the first setting of the
-    suite are those of the headline.
+    `items` has each track's number. The suite's first matcher and setting are the headline's.
     """
 
     suite: Suite
@@ -298,10 +294,7 @@ def load_run(path: str | Path) -> Run:
 
 
 def checked_models(run: Run, models: Sequence[str]) -> Sequence[str]:
-    """Return the named models, or all of the run.
-
-    Raises SpecError for one that the run does not have, or that is named twice.
-    """
+    """Return the named models, or all. Raises SpecError for an unknown or repeated name."""
     known = run.design.model_names
     if unknown := [name for name in models if name not in known]:
         where, found, allowed = str(run.path), ", ".join(unknown), ", ".join(known)

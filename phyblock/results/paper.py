@@ -57,9 +57,7 @@ def published_frame(run: Run) -> pd.DataFrame:
 
 
 def beside_paper(run: Run) -> TextTable | None:
-    """Return our numbers beside the paper's Table 1; None if it has no model of the run, or the run
-    is not on the official scenes.
-    """
+    """Return numbers beside the paper's Table 1; None without its models or official scenes."""
     suite = run.design.suite
     if "full_planning" not in suite.tracks or suite.dataset.format != "official":
         return None

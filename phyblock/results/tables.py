@@ -163,8 +163,7 @@ def coverage_frame(run: Run) -> pd.DataFrame:
     costs of this run, and `cost_unknown`, the number of others; `cached` ones, paid for by another
     run and free here; `cost_per_100_usd`, the cost of 100 at the price of those with a known one,
     including cached ones; median and 90th percentile of the latency [s] of those that were sent;
-    `attempts`, the number of requests sent for them. NaN if nothing is known. The frame is cached
-    and must not be changed.
+    `attempts`, the number of requests. NaN if nothing is known. Do not change the cached frame.
     """
     if "coverage" in run.made:
         return run.made["coverage"]

@@ -71,8 +71,7 @@ class Column:
 
 @dataclass(frozen=True)
 class TextTable:
-    """Cells as text, row by row, with a caption and notes, each on one line; `frame` has the
-    numbers, if they are kept.
+    """Cells as text by row, with a caption and notes, each on one line; `frame` has the numbers.
 
     Cells hold names that models and people chose: newlines and control characters become spaces.
     """

@@ -49,9 +49,8 @@ def make_manifest(
 ) -> Manifest:
     """Return the manifest of a run.
 
-    `identity` is a digest of everything that determines the results, so that only the same run can
-    continue in a folder. It excludes limits, prices, labels, paths, and the order and addresses of
-    models. `variants` has the tracks of every condition.
+    `identity` digests everything that determines the results, so that only the same run can
+    continue in a folder: not limits, prices, labels, paths, or the order and addresses of models.
     """
     data_version = read_version(dataset.root)
     data: dict[str, object] = {"name": dataset.name, "sha256": dataset.sha256}

@@ -1,6 +1,4 @@
-"""The plan of a run: files found, suite and data read, models and tracks resolved, its cost
-estimated; nothing is called or rendered.
-"""
+"""The plan of a run: suite, data, models, tracks and cost; nothing is called or rendered."""
 
 from __future__ import annotations
 
@@ -78,11 +76,7 @@ class Sample:
 
 @dataclass(frozen=True)
 class RunPlan:
-    """Everything a run needs.
-
-    `manifest` is the content of `run.yaml`; `tracks` are those of the reference condition,
-    `variants` all conditions with the tracks of each.
-    """
+    """Everything a run needs; `variants` has all conditions with the tracks of each."""
 
     suite: Suite
     models: tuple[ModelConfig, ...]
@@ -110,9 +104,7 @@ class RunPlan:
         return frozenset(sample.id for model in self.models for sample in self.samples(model))
 
     def samples(self, model: ModelConfig) -> Iterator[Sample]:
-        """Yield all samples of a model, by seed, condition, track in the suite's order, and item,
-        interleaved over levels and scenes.
-        """
+        """Yield samples by seed, condition, track and item, interleaved over levels and scenes."""
         asked = [
             (variant, track, interleaved(track.items))
             for variant, tracks in self.variants.items()
@@ -140,10 +132,9 @@ def make_plan(
 ) -> RunPlan:
     """Resolve a suite against the known models.
 
-    `only` names models to run instead of the suite's, `people` are asked instead of models.
-    `limit`, else that of the suite, keeps that many items of each track: scenes spread over levels,
-    questions over subtasks. Raises SpecError, DataError, StoreError or PromptError with all
-    problems.
+    `only` names models to run instead of the suite's; `people` are asked instead of models.
+    `limit`, else the suite's, keeps that many items of each track, spread over levels or subtasks.
+    Raises SpecError, DataError, StoreError or PromptError with all problems.
     """
     dataset = open_dataset(suite.dataset.format, suite.files.dataset)
     models = _planned_models(suite, known, only, people)
@@ -178,10 +169,7 @@ def make_plan(
 def _conflicts(
     models: Sequence[ModelConfig], tracks: Sequence[Track], suite: Suite
 ) -> Iterator[Problem]:
-    """Yield the reasons why a model cannot answer a track, or is ambiguous.
-
-    A recording must match the parser and the candidate numbers of the suite.
-    """
+    """Yield the reasons why a model cannot answer a track, or is ambiguous."""
     for earlier, later in combinations(models, 2):
         is_elsewhere = set(earlier.addresses) != set(later.addresses)
         if is_elsewhere and earlier.identity() == later.identity():
@@ -317,10 +305,9 @@ def check_models(
 class Estimate:
     """The estimate of one model.
 
-    `done` samples have a record in the folder, `cached` ones a reply in the cache, `waiting` ones
-    are in batches, `calls` are still to be made: none for recordings and baselines, which answer
-    locally. `cost_usd` are the dollars for the calls, `most_usd` those if every reply had the
-    maximum length and no call had to be repeated; None where no price is known.
+    `done` samples have a record, `cached` ones a reply in the cache, `waiting` ones are in batches;
+    `calls` are to be made, none for recordings and baselines. `cost_usd` is the price of the calls,
+    `most_usd` that if every reply were as long as allowed and no call repeated; None if unknown.
     """
 
     model: ModelConfig
@@ -363,8 +350,7 @@ def estimate(
 ) -> list[Estimate]:
     """Return estimates in the order of the plan's models.
 
-    With `retry_failed`, rejected requests count as calls. Raises StoreError for the folder of
-    another run.
+    With `retry_failed`, rejected requests count. Raises StoreError for another run's folder.
     """
     rows = {m.name: Estimate(m, plan.samples_per_model, tariff_of(m)) for m in plan.models}
     settled: dict[str, bool] = {}
@@ -409,10 +395,7 @@ def may_bill(
 
 
 def _samples(plan: RunPlan) -> Iterator[tuple[Sample, Sequence[Request]]]:
-    """Yield all samples with their requests as far as they are known before any reply.
-
-    Requests that are presented identically are outlined once.
-    """
+    """Yield samples with the requests known before any reply, outlining identical ones once."""
     for shown_in, tracks in plan.variants.items():
         repeats = [variant for variant in plan.variants if variant.shown == shown_in]
         asked = [(track, item) for track in tracks for item in track.items]
@@ -434,10 +417,7 @@ def bundled_suites() -> list[str]:
 
 
 def find_suite(name: str) -> Path:
-    """Return the suite file that `name` means: a path, or the name of a bundled suite.
-
-    Raises SpecError, listing the bundled suites, if there is no such file.
-    """
+    """Return the file of a suite by its path or bundled name. Raises SpecError if there is none."""
     path, suites = Path(name), bundled_suites()
     if os.path.isfile(path):
         return path

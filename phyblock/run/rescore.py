@@ -44,11 +44,10 @@ def rescore(
 ) -> None:
     """Rescore every stored reply of a run and replace its records in one step.
 
-    `data` is the new place of the data set, if it has moved. An episode in which today's code would
-    ask something else is kept, but is no longer final: `report` gets a sentence on the number of
-    these; `watch` wraps the records as they are rescored. `workers` do the work, if given, and only
-    the first of their shards writes. Raises StoreError if the folder is not a run or cannot be
-    written, DataError if the data are not the run's.
+    `data` is the data set's new place, if it has moved. An episode in which today's code would ask
+    something else is kept, but is no longer final: `report` gets a sentence on their number;
+    `watch` wraps records as they are rescored. Of `workers`, only the first shard writes. Raises
+    StoreError if the folder is no run or cannot be written, DataError if the data are not its own.
     """
     diverged: Counter[str] = Counter()
     writes = workers is None or workers.shards is None or workers.shards.writes
@@ -89,9 +88,8 @@ def rescore(
 def judged_again(folder: Path) -> tuple[Manifest, Iterator[Record]]:
     """Return the manifest of a run and a rescored record for each line, from replies and data.
 
-    Facts about items, and the numbers of items, come from the data. Nothing is simulated: falls and
-    final poses come from the records. Nothing is written. Raises as `rescore`, and StoreError for
-    an episode that would take another course.
+    Facts about items come from the data, falls and final poses from the records. Nothing is
+    written. Raises as `rescore`, and StoreError if an episode would take another course.
     """
     judge = _Judge(folder, strict=True)
 
@@ -130,10 +128,7 @@ def _asked_about(manifest: Manifest, suite: Suite, dataset: Dataset) -> Dataset:
 def reopen_tracks(
     folder: Path, manifest: Manifest, suite: Suite, dataset: Dataset
 ) -> tuple[Track, ...]:
-    """Return the tracks of the run in `folder`, without prompts, on the run's `dataset`.
-
-    Raises DataError if the data of a track are not the run's.
-    """
+    """Return a run's tracks without prompts. Raises DataError if data of one are not the run's."""
     path = folder / MANIFEST
     folders: dict[str, Path] = {}
     if manifest.questions is not None:
@@ -153,10 +148,7 @@ def reopen_tracks(
 
 
 class _Judge:
-    """Rescores records of the run in `folder`, on tracks that are opened once.
-
-    With `strict`, an episode that would take another course raises a StoreError.
-    """
+    """Rescores records of a run; if `strict`, raises StoreError where an episode would differ."""
 
     def __init__(self, folder: Path, data: Path | None = None, *, strict: bool = False) -> None:
         self.manifest = manifest = read_manifest(folder)
@@ -187,7 +179,6 @@ class _Judge:
         return record, self._thread.submit(asyncio.run, work).result()
 
     def close(self) -> None:
-        """Close the tracks."""
         self._thread.shutdown()
         for of_condition in self.tracks.values():
             for track in of_condition.values():

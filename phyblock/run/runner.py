@@ -64,9 +64,7 @@ class SampleDone:
 
 @dataclass(frozen=True)
 class Stopping:
-    """The run starts no new samples: it was interrupted, its cost limit is reached, or an internal
-    error ends it; it waits for `in_flight` calls.
-    """
+    """The run starts no new samples; it waits for `in_flight` calls."""
 
     cause: Literal["interrupted", "cost", "error"]
     reason: str
@@ -131,9 +129,8 @@ class RunResult:
 class Session:
     """Runs one plan in one folder, once.
 
-    It asks every model about every sample without a final record; with `retry_failed` also samples
-    whose request was rejected for good. `present` are models in this process, by name; others are
-    built.
+    It asks about every sample without a final record, with `retry_failed` also those whose request
+    was rejected for good. `present` are models in this process, by name; others are built.
     """
 
     plan: RunPlan
@@ -169,9 +166,8 @@ class Session:
     async def run(self) -> RunResult:
         """Open the folder, ask all samples without a final record, and close it.
 
-        Raises errors of the folder or of building models, and, once calls in progress have ended,
-        the first error of a sample that concerns neither the sample nor its model. A cancellation
-        gives up calls in progress.
+        Raises errors of the folder or of building models and, once calls in progress have ended,
+        the first error that concerns neither a sample nor its model. A cancellation gives up calls.
         """
         task = asyncio.current_task()
         assert task is not None
@@ -196,9 +192,7 @@ class Session:
         return self.result
 
     def _open(self, stack: AsyncExitStack) -> None:
-        """Open store, cache and models until the stack is closed, queue the samples that are left,
-        and emit the progress of the run.
-        """
+        """Open store, cache and models for the stack, queue samples, emit the run's progress."""
         plan, result, limits = self.plan, self.result, self.plan.suite.limits
         stack.callback(plan.close)
         samples = {planned.name: list(plan.samples(planned)) for planned in plan.models}
@@ -308,9 +302,7 @@ class Session:
         await self._store.records.drain()
 
     async def _work(self, model: str) -> None:
-        """Ask, judge and record samples until the queue is empty, as it is when its model or the
-        run is stopped.
-        """
+        """Ask, judge and record samples until none is left, or the model or run is stopped."""
         queue = self._queues[model]
         while queue:
             sample = queue.popleft()

@@ -108,11 +108,7 @@ class AppendFile:
             self._size_bytes += len(data)
 
     async def put(self, line: Line) -> None:
-        """Append a line outside of the event loop, together with other waiting ones, and wait until
-        it is on disk.
-
-        Raises StoreError as `append`.
-        """
+        """Append a line, with others that wait, outside of the event loop; raises as `append`."""
         written: asyncio.Future[None] = asyncio.get_running_loop().create_future()
         self._waiting.append((line, written))
         if self._flusher is None:
@@ -199,10 +195,7 @@ def about_item(track: Track, item: Item) -> dict[str, Any]:
 
 
 def judged(track: Track, item: Item, fields: Mapping[str, Any], judgement: Judgement) -> Record:
-    """Return the record with its outcome, and the judgement and counts of the track.
-
-    `fields` are those of a record before judgement, or of an earlier record.
-    """
+    """Return a record, from the fields of an unjudged or earlier one, with judgement and counts."""
     reply, error = fields["reply"], fields["error"]
     outcome: Outcome = "ok" if judgement.is_read else "parse_failure"
     if error is not None:
@@ -254,8 +247,7 @@ def judge_episode(
 async def judge_reply(
     track: Track, item: Item, fields: Mapping[str, Any], earlier: Record | None = None
 ) -> Record:
-    """Return the record of a sample with one request, judged for the first time or again after an
-    `earlier` record.
+    """Return the record of a single request, judged now or again after an `earlier` record.
 
     If no engine could execute the reply, the record says so and can be judged again.
     """
@@ -272,8 +264,7 @@ async def judge_reply(
 
 
 class Summary(NamedTuple):
-    """The part of a record that live progress needs; `counts` are of the headline matcher and
-    setting.
+    """The part of a record that live progress needs; `counts` are those of the headline.
 
     `paid_usd` is None if a price is unknown, `cached` None without a reply.
     """
@@ -302,9 +293,8 @@ class Summary(NamedTuple):
 class Progress:
     """The summary of the newest record of every sample, and the cost of the run so far.
 
-    `batches` are all lines about batches, oldest first; `calls` is the number of calls made,
-    `replies` are those without a final record, by key, and `unanswered` the calls without a known
-    end, by number: each may have been billed.
+    `batches` are lines about batches, oldest first; `calls` counts calls; `replies` are those
+    without a final record, by key, `unanswered` calls without a known end, which may be billed.
     """
 
     samples: dict[str, Summary] = field(default_factory=dict)
@@ -355,16 +345,14 @@ class Progress:
 class RunStore:
     """A run folder opened for writing, and the journal of the run's calls; one process at a time.
 
-    `records` and `batches` are synced line by line. `progress` is the progress of the run when the
-    folder was opened; replies in it without a record are not requested again. `run` is the digest
-    that records of this run carry.
+    `records` and `batches` are synced line by line. `progress` is that when the folder was opened;
+    its replies without a record are not requested again. `run` is the digest in this run's records.
     """
 
     def __init__(self, folder: Path, manifest: Manifest, samples: Collection[str]) -> None:
         """Open `folder` for the run that `manifest` describes, creating it when it is new.
 
-        `samples` are the ids of the run's samples. Raises StoreError when the folder cannot be
-        written, holds records of another run, or is being written by another process.
+        `samples` are ids. Raises StoreError if it cannot be written, is in use or has another run.
         """
         self.progress = Progress()
         self._folder = folder
@@ -415,9 +403,7 @@ class RunStore:
         await self.calls.put(call.model_copy(update=known))
 
     def keep_prompt(self, request: Request, template: str) -> SentPrompt:
-        """Write a prompt unless it is stored, and return what its record holds of it; raises as
-        `append`.
-        """
+        """Write a prompt unless it is stored; return its part of a record. Raises as `append`."""
         fields = [
             {
                 "role": message.role,
@@ -442,8 +428,7 @@ class RunStore:
     def note_stopped(self, models: Mapping[str, str], run: str, asked: Collection[str]) -> None:
         """Write why the models among `asked`, or the whole run, were stopped.
 
-        Entries of earlier sessions about other models are kept. Raises StoreError if the folder
-        cannot be written.
+        Earlier entries about other models are kept. Raises StoreError if the disk fails.
         """
         earlier = read_stopped(self._folder).models
         kept = {name: why for name, why in earlier.items() if name not in asked}
@@ -488,12 +473,10 @@ def _selection(manifest: Manifest) -> tuple[list[str], object]:
 
 
 def held_run(folder: Path, manifest: Manifest) -> Manifest | None:
-    """Return the manifest in `folder` if it holds the run of `manifest`, or None if it holds no
-    run. Nothing is written.
+    """Return the manifest in `folder` if it holds the run of `manifest`, None if it holds no run.
 
-    Raises StoreError if it holds records or calls of another run or another version of phyblock, or
-    anything else. A manifest without records or calls does not count as a run: it is left by a run
-    that failed at once, and nothing would be lost with it.
+    Raises StoreError if it holds records or calls of another run or version of phyblock, or
+    anything else. A manifest alone does not count as a run: it is left by one that failed at once.
     """
     check_place(folder)
     if not (folder / MANIFEST).exists():
