@@ -17,7 +17,7 @@ from phyblock.cli.console import (
     sets_option,
     shown_path,
 )
-from phyblock.config.models import RECORDED, ModelConfig, load_models, with_members
+from phyblock.config.models import GROUP, RECORDED, load_models, with_members
 from phyblock.config.suite import Suite, suite_model
 from phyblock.config.yaml import read_yaml
 from phyblock.data.lookup import read_data_set
@@ -149,19 +149,21 @@ def models(models_file: str | None) -> None:
     console = make_console()
     rows: list[tuple[str, ...]] = []
     suite = Suite(name="models", models=("random",))
-    for name in (*baseline_names(), *known):
-        config = to_config(name, known.get(name, ModelConfig(name=name)), suite)
-        groups = ", ".join(config.groups)
-        if config.kind != "litellm":
-            rows.append((name, groups, str(config.recording or config.kind), "", "0, 0"))
+    for name, entry in known.items():
+        if (config := to_config(name, entry, suite)).kind != "litellm":
+            rows.append((name, str(config.recording), "", "0, 0"))
             continue
         status, tariff = api_key_status(config), tariff_of(config)
-        key = f"needs {status.variables[0]}" if status.is_needed else "not needed"
+        key = f"no {status.variables[0]}" if status.is_needed else "not needed"
         key = "set" if status.key else key
         price = f"{tariff.input:.10g}, {tariff.output:.10g}" if tariff else "unknown"
-        rows.append((name, groups, config.id, key, price))
-    print_rows(console, ("model", "groups", "id", "key", "$/M in, out"), rows, numbers=1)
+        rows.append((name, config.id, key, price))
+    print_rows(console, ("model", "id", "key", "$/M in, out"), rows, numbers=1)
     console.print(f"{counted(len(known), 'model')} in {shown_path(path)}")
+    for group in dict.fromkeys(group for config in known.values() for group in config.groups):
+        members = ", ".join(with_members([GROUP + group], known))
+        console.print(f"{GROUP}{group}: {members}")
+    console.print(f"Baselines, at no cost: {', '.join(baseline_names())}")
 
 
 @click.command()
