@@ -45,7 +45,7 @@ from phyblock.records.files import (
 from phyblock.records.record import Record
 from phyblock.results.load import design_of
 from phyblock.run.manifest import portable_manifest, without_paths
-from phyblock.run.rescore import judged_again, recorded_dataset, reopen_tracks
+from phyblock.run.rescore import recorded_dataset, reopen_tracks, rescored
 from phyblock.run.store import record_lines
 from phyblock.tracks.base import simulating
 
@@ -132,7 +132,7 @@ def opened_bundle(path: Path, data: Sequence[Path] = ()) -> Iterator[Verified]:
             manifest = read_manifest(folder)
             here = _localized(folder, manifest, data)
             (folder / MANIFEST).write_text(dump_yaml(here.fields()), encoding="utf-8")
-            judged, again = judged_again(folder)
+            judged, again = rescored(folder)
             counted = ("items", "scenes", "scenes_by_level")
             differ = [name for name in counted if getattr(here, name) != getattr(judged, name)]
             if differ or not here.models:

@@ -143,7 +143,7 @@ def show(run: Path, sample: str, data: Path | None) -> None:
         console.print(" · ".join(facts), style="dim")
     console.print("\nRead", style="bold")
     parser = getattr(record.parse, "rule", None)
-    console.print((record.said or "nothing") + (f" (rule {parser})" if parser else ""))
+    console.print((record.parsed_text or "nothing") + (f" (rule {parser})" if parser else ""))
     if record.is_correct is not None:
         verdict = "right" if record.is_correct else f"wrong: the answer is {record.target}"
         console.print(verdict, style="green" if record.is_correct else "red")

@@ -314,7 +314,7 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
         if action == "pose" and observe == "text":
             raise ValueError("observe is 'text'; the prompt of a step is of action='block' alone")
         if action == "pose" and physics == "off":
-            raise ValueError("physics is 'off'; a pose is carried out: allowed: settle, strict")
+            raise ValueError("physics is 'off'; a pose is executed: allowed: settle, strict")
         for name, most in {"max_steps": max_steps, "max_failures": max_failures}.items():
             if most is not None and most < 1:
                 raise ValueError(f"{name} is {most}; allowed: 1 or more, or None")

@@ -123,7 +123,7 @@ def phyblock_scorer(asked: Tasks) -> scorer.Scorer:
         found = await asyncio.to_thread(one.score, reply)
         return scorer.Score(
             value={found.measure: found.value, "success": float(found.success)},
-            answer=found.record.said,
+            answer=found.record.parsed_text,
             explanation=found.problem,
             metadata=found.as_json(),
         )

@@ -304,7 +304,7 @@ class BatchModel:
             return
         await self._note(batch, "created", id=status.id)
         batch.lines.clear()
-        self._say(f"sent batch {batch.shown} of {len(batch.most_usd):,}")
+        self._notify(f"sent batch {batch.shown} of {len(batch.most_usd):,}")
 
     def _unsure(self, batch: Batch, why: str) -> UnavailableError:
         """Return the error of a batch that may exist, which a person has to check."""
@@ -336,10 +336,10 @@ class BatchModel:
                 if status.words != logged:
                     logged = status.words
                     since = batch.created.astimezone().strftime("%d %b %H:%M")
-                    self._say(f"waiting for batch {batch.shown} since {since}: {logged}")
+                    self._notify(f"waiting for batch {batch.shown} since {since}: {logged}")
                 await asyncio.sleep(pause_s)
                 pause_s = min(self.files.poll_s, 1.5 * pause_s)
-            self._say(f"batch {batch.shown} has ended: {status.words}")
+            self._notify(f"batch {batch.shown} has ended: {status.words}")
             if status.state == "refused":
                 self._refusal = UnavailableError(f"batch {batch.shown} was refused: {status.words}")
                 self._settle_all(batch, 0.0)
@@ -370,7 +370,7 @@ class BatchModel:
         reply = reply.model_copy(update={"latency_s": 0.0, "batched": True})
         return reply.model_copy(update={"cost_usd": cost_usd(self.budget.tariff, reply)})
 
-    def _say(self, text: str) -> None:
+    def _notify(self, text: str) -> None:
         self.report(ModelEvent(self.name, "notice", text))
 
 

@@ -375,7 +375,7 @@ class Record(Line):
         return ""
 
     @property
-    def said(self) -> str | None:
+    def parsed_text(self) -> str | None:
         """The parsed answer, in short."""
         plan = getattr(self.parse, "plan", None)
         return None if plan is None else " ".join(map(str, plan))
@@ -388,7 +388,7 @@ class Record(Line):
         )
         if score is None:
             return None
-        names = (self.said or "").split()
+        names = (self.parsed_text or "").split()
         return Course(tuple(zip(names, score.why or (), strict=False)), score.fn)
 
     def built(self, _task: AssemblyTask) -> tuple[Block, ...]:

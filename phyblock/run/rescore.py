@@ -23,7 +23,7 @@ from phyblock.records.record import AskedTurn, Record, StoredError
 from phyblock.run.manifest import asked_counts, code_versions
 from phyblock.run.store import about_item, judge_reply, judged, locked, write_run
 from phyblock.text import counted
-from phyblock.tracks.base import CARRYING, ENGINE, Item, Track, kind_of, open_tracks, select_tasks
+from phyblock.tracks.base import ENGINE, EXECUTION, Item, Track, kind_of, open_tracks, select_tasks
 from phyblock.workers import Workers
 
 _CHANGED = "is not the data set that the run was made on, or it was changed since"
@@ -31,7 +31,7 @@ _MOVED = "name the folder where it is now with --data"
 _STALE = "remove the folder of shards beside the run, and score again"
 _Judged = tuple[Record, Record]
 """A stored record, and the rescored one."""
-_NO_DATA = ("prompt", "pictures", CARRYING, ENGINE)
+_NO_DATA = ("prompt", "pictures", EXECUTION, ENGINE)
 """Parts of a track's identity that are not the data that it asks about."""
 
 
@@ -85,7 +85,7 @@ def rescore(
         )
 
 
-def judged_again(folder: Path) -> tuple[Manifest, Iterator[Record]]:
+def rescored(folder: Path) -> tuple[Manifest, Iterator[Record]]:
     """Return the manifest of a run and a rescored record for each line, from replies and data.
 
     Facts about items come from the data, falls and final poses from the records. Nothing is

@@ -249,7 +249,7 @@ async def judge_reply(
 ) -> Record:
     """Return the record of a single request, judged now or again after an `earlier` record.
 
-    If no engine could execute the reply, the record says so and can be judged again.
+    If no engine could execute the reply, the record says so and can be rescored.
     """
     reply = fields["reply"]
     text = None if reply is None else reply.text

@@ -42,7 +42,7 @@ ENGINE = "physics"
 """Key in a track's identity of the physics engine that affects its results, unless it is the
 reference engine. Results of the engine are in the records.
 """
-CARRYING = "carrying"
+EXECUTION = "execution"
 """Key of the version of plan execution and its measurements."""
 
 
@@ -424,11 +424,11 @@ class Track(ABC):
         wanted = None if form is None else form.response_format
         return Request(key, seed, messages, params, version, about, wanted, self.name)
 
-    async def work_out(self, work: Callable[[], Any]) -> Any:
+    async def compute(self, work: Callable[[], Any]) -> Any:
         """Return the result of `work`, a `partial`, from another process, else from a thread."""
         if self.shop is None:
             return await asyncio.to_thread(work)
-        return await self.shop.work_out(work)
+        return await self.shop.compute(work)
 
     def close(self) -> None:
         """Stop the worker processes."""

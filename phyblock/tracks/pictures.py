@@ -89,7 +89,7 @@ class Workshop:
         self._recent: dict[tuple[str, str], Image] = {}
         self._recent_lock = threading.Lock()
 
-    async def work_out(self, work: Callable[[], _Result]) -> _Result:
+    async def compute(self, work: Callable[[], _Result]) -> _Result:
         """Return the result of `work`, a `partial` of a module-level function, in a worker process.
 
         If a process is killed, the work is repeated alone. Raises SimulationError if it is killed
@@ -143,7 +143,7 @@ class Workshop:
             # All who ask for the same picture wait for the first of them.
             async with self._drawn[drawing.key]:
                 if (image := self._kept(drawing)) is None:
-                    image = self._keep(drawing, await self.work_out(drawing.make))
+                    image = self._keep(drawing, await self.compute(drawing.make))
         return image
 
     def _kept(self, drawing: Drawing) -> Image | None:
@@ -188,7 +188,7 @@ class LocalShop(Workshop):
 
     _one_at_a_time = threading.Lock()
 
-    async def work_out(self, work: Callable[[], _Result]) -> _Result:
+    async def compute(self, work: Callable[[], _Result]) -> _Result:
         """Return the result of `work`; one at a time, as a physics engine requires."""
         with self._one_at_a_time:
             return work()

@@ -42,8 +42,8 @@ from phyblock.sim.geometry import box_height_cm, center_cm, origin_m, put
 from phyblock.sim.pictures import goal_style, kit_key, kit_png, ruled_key, ruled_png, written_style
 from phyblock.text import plain_sum
 from phyblock.tracks.base import (
-    CARRYING,
     ENGINE,
+    EXECUTION,
     Judgement,
     NumberField,
     Pick,
@@ -56,7 +56,7 @@ from phyblock.tracks.measures import SampleCounts, level_cells
 from phyblock.tracks.pictures import Drawing, picture_style
 from phyblock.types import REFUSED_ENDS, STEP_ENDS, Matcher, Setting, StepEnd, View
 
-CARRY_VERSION = 4
+EXECUTION_VERSION = 4
 """Version of plan execution and its measurements; increased when the end of a plan may change."""
 KIT_LABEL = "blocks"
 """The label of the sheet of candidates."""
@@ -391,7 +391,7 @@ def _plan(setting: Setting) -> SampleCounts:
     return SampleCounts(f"plan_{setting.lower()}", ("tp", "fp", "fn"), record=of)
 
 
-_SAME = tuple(f"tracks.pose_planning.{key}" for key in (CARRYING, ENGINE))
+_SAME = tuple(f"tracks.pose_planning.{key}" for key in (EXECUTION, ENGINE))
 _FITS = ("position_cm", "turn_deg", "iou")
 _WHOLE_COUNTS = ("steps", "reached", "blocks", "iou", "completed", "plans")
 _RIGHT = tuple(f"{frame}_{cm:g}" for frame in POSE_FRAMES for cm in TOLERANCES_CM)
@@ -422,7 +422,7 @@ class PosePlanning(SceneTrack):
         SampleCounts("poses", (*_RIGHT, "steps", "blocks"), record=_right),
         FITS,
         SampleCounts(
-            "carried", (*STEP_ENDS, *POSE_ERRORS, *_WHOLE_COUNTS), record=_ends, same=_SAME
+            "executed", (*STEP_ENDS, *POSE_ERRORS, *_WHOLE_COUNTS), record=_ends, same=_SAME
         ),
         _plan("A"),
         _plan("B"),
@@ -465,7 +465,7 @@ class PosePlanning(SceneTrack):
 
     def identity(self) -> dict[str, Any]:
         """Return what determines its results, with the version of plan execution."""
-        return {**super().identity(), CARRYING: CARRY_VERSION}
+        return {**super().identity(), EXECUTION: EXECUTION_VERSION}
 
     def json_form(self, item: AssemblyTask) -> AnswerForm[Any]:
         """Return the JSON form of a plan."""
@@ -488,7 +488,7 @@ class PosePlanning(SceneTrack):
         A plan that an earlier record holds is not executed again.
         """
         rules = (self.suite.settings, self.suite.scoring.matchers, earlier)
-        found: Judgement = await self.work_out(partial(judge_poses, item, text, *rules))
+        found: Judgement = await self.compute(partial(judge_poses, item, text, *rules))
         return found
 
 

@@ -152,7 +152,7 @@ class ChoiceRecord(Record):
         return "" if self.answer is None else self.answer.right
 
     @property
-    def said(self) -> str | None:
+    def parsed_text(self) -> str | None:
         """The letters given."""
         return None if self.answer is None else self.answer.given
 

@@ -392,7 +392,7 @@ class StepPlanning(SceneTrack):
         """Return the orders of blocks that fall when all are released at their goal poses."""
         if blocks not in self._fallen:
             trial = DEFAULT_TRIAL if self.spec.physics == "strict" else ONE_SETTING
-            settled = await self.work_out(functools.partial(settle, blocks, trial))
+            settled = await self.compute(functools.partial(settle, blocks, trial))
             self._fallen[blocks] = settled.fallen
         return self._fallen[blocks]
 

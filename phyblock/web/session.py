@@ -460,7 +460,7 @@ class Ending:
 def went(record: Record, matcher: str) -> dict[str, Any]:
     """Return the answer, step by step with the reason for wrong ones, or with the right answer."""
     if record.is_correct is not None:
-        return {"given": record.said, "right": record.target, "correct": record.is_correct}
+        return {"given": record.parsed_text, "right": record.target, "correct": record.is_correct}
     course = record.course(matcher)
     if course is None:
         return {}

@@ -258,7 +258,7 @@ def test_a_reply_whose_judging_kills_workers_is_recorded_and_scored_later(
 
     async def fatal(track, item, text, earlier):
         if text is not None and item.key == SCENES[0]["id"]:
-            await track.work_out(partial(killed, marks, 2))
+            await track.compute(partial(killed, marks, 2))
         return await whole(track, item, text, earlier)
 
     monkeypatch.setattr(PosePlanning, "judge_apart", fatal)
@@ -325,9 +325,9 @@ def test_no_process_outlives_a_killed_run(workspace):
 
 def test_work_of_a_worker_that_was_killed_is_done_again_once(tmp_path):
     async def work():
-        assert await shop.work_out(partial(killed, tmp_path, 1)) == "done"
+        assert await shop.compute(partial(killed, tmp_path, 1)) == "done"
         with pytest.raises(SimulationError, match="killed twice"):
-            await shop.work_out(partial(killed, tmp_path, 3))
+            await shop.compute(partial(killed, tmp_path, 3))
 
     shop = Workshop(1)
     try:

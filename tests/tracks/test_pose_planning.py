@@ -167,10 +167,10 @@ def test_a_run_is_scored_again_without_an_engine(inside, monkeypatch):
     run = ["run", "suite.yaml", "--out", "out", "--no-report"]
     assert not call(*run)
     monkeypatch.setattr(pose_track, "execute", None)
-    monkeypatch.setattr(pose_track, "CARRY_VERSION", pose_track.CARRY_VERSION + 1)
+    monkeypatch.setattr(pose_track, "EXECUTION_VERSION", pose_track.EXECUTION_VERSION + 1)
     again = shutil.copytree(inside.out, inside.root / "again")
     rescore(again)
-    with pytest.raises(StoreError, match=r"pose_planning\.carrying"):
+    with pytest.raises(StoreError, match=r"pose_planning\.execution"):
         call(*run)
     whole, scored = ({r["sample"]: r for r in inside.records(path)} for path in (inside.out, again))
     for name in ("parse", "scores", "pose"):

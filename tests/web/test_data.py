@@ -262,12 +262,12 @@ MEMBERSHIP = {"scoring": manifest(level1="membership")["suite"]["scoring"]}
         (of_data(sha256="1"), "dataset.sha256"),
         (of_track(prompt={"name": "p", "version": "b" * 64}), "tracks.full_planning.prompt"),
         ({"suite": MEMBERSHIP}, "scoring.level1"),
-        (of_track(carrying=2), "tracks.full_planning.carrying"),
+        (of_track(execution=2), "tracks.full_planning.execution"),
     ],
 )
 def test_runs_that_differ_in_what_decides_are_refused_with_what_differs(change, field):
     first = site_run("one", **shown({}, "a"))
-    first.run.manifest.tracks["full_planning"]["carrying"] = 1
+    first.run.manifest.tracks["full_planning"]["execution"] = 1
     other = site_run("two", **change)
     problem = problem_of(SpecError, check_runs, [first, other])
     assert (problem.where, problem.field) == ("two", field)

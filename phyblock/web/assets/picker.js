@@ -143,7 +143,7 @@ const Picker = (() => {
       return submit({ picks: picks.list.map((one) => one.place), ...(hasFields ? { numbers } : {}) });
     }
 
-    /** Make the list of picks anew. */
+    /** Rebuild the list of picks. */
     function lay() {
       // A single pick that a button shows already need not be said twice.
       const isSaid = isOne && picks.list.every(({ place }) => buttons[place]);
