@@ -58,8 +58,7 @@ def ratio_of(sums: Floats) -> Floats:
     """Part / whole of counts (..., [part, whole]), such as right answers / answers.
 
     NaN where the whole is 0, or the part is larger and so no share of it: the paper's criterion
-    `membership` counts repeated steps again. The mean of such ratios over the axis before the last
-    is a macro average.
+    `membership` counts repeated steps again.
     """
     part, whole = sums[..., 0], sums[..., 1]
     out = np.full(part.shape, np.nan)
@@ -85,8 +84,7 @@ ERROR_TYPES: tuple[ErrorType, ...] = get_args(ErrorType)
 """The four types of wrong steps (paper appendix B.3), exhaustive and exclusive: the first that
 holds at the step. No goal block has this type and color; every such block is already placed; an
 unplaced one exists, but none that equals the candidate under the setting (A only); an unplaced
-equal one exists but is not ready.
-"""
+equal one exists but is not ready."""
 
 BlockOutcome = Literal[
     "placed",
@@ -104,8 +102,7 @@ which names a kind that is not needed, or not so often. `wrong_orientation`: its
 in another pose (setting A only). `order`: another order of the plan's steps would place it. Else it
 is named as it is, but no order of the steps makes it ready, because blocks that it rests on,
 directly or not, are never named (`support_not_named`), named in another pose (`support_turned`), or
-some the one and some the other (`support_both`).
-"""
+some the one and some the other (`support_both`)."""
 
 
 class Goal:
@@ -185,9 +182,8 @@ def match_plan(goal: Goal, plan: Plan, matcher: Matcher) -> Match:
 
     `paper` is Algorithm 1 of the paper: each step takes the first ready equal block in file order.
     `optimal` chooses among interchangeable ready blocks so that the whole plan has the most true
-    positives, so every valid order scores 1. Among equally good choices, it takes the one with the
-    fewest `overflow` steps, then the fewest `incorrect_orientation`: so the file order of blocks
-    changes no count.
+    positives, so every valid order scores 1; then the fewest `overflow` steps, then the fewest
+    `incorrect_orientation`, so that the file order of blocks changes no count.
     """
     vertices: list[int | None] = []
     if matcher == "optimal":
@@ -250,10 +246,7 @@ def steps_back(history: Sequence[Mapping[int, int | None]], reached: int) -> lis
 
 
 def most_placed(goal: Goal, plan: Plan) -> int:
-    """Return only the number of true positives under the `optimal` matcher.
-
-    Faster than `match_plan`. Raises KeyError for a step that names no candidate.
-    """
+    """Return the true positives of `match_plan` with `optimal`, but faster; raises as it does."""
     frontier = {0}
     for ways in map(goal.ways.__getitem__, plan.steps):
         if len(ways) == 1:
@@ -375,10 +368,9 @@ def _most_standing(
 def steps_kept(goal: Goal, plan: Plan, at_least: int = 0) -> int:
     """Return the most steps of a plan that occur, in its order, in one valid order of the goal.
 
-    That order is the plan with the other steps removed and the other blocks inserted, and no valid
-    order needs fewer such edits. Steps may stand for any equal blocks as long as none comes after
-    one that rests on it. `at_least` is a known lower bound. Raises KeyError for a step that names
-    no candidate.
+    That order is the plan with other steps removed and other blocks inserted, and no valid order
+    needs fewer edits. Steps may stand for any equal blocks, none after one that rests on it.
+    `at_least` is a known lower bound. Raises KeyError for a step that names no candidate.
     """
     steps = [goal.equal[index] for index in plan.steps]
     # For each place in the plan, the number of steps from there on that equal each set of blocks,
@@ -457,10 +449,7 @@ class AssemblyScorer:
     def _score(
         self, plan: Plan, matchers: tuple[Matcher, ...], level1: Level1Criterion | None
     ) -> tuple[Score, ...]:
-        """Return scores by setting, then matcher; Level-1 criteria only for scenes of level 1.
-
-        Raises KeyError for a step that names no candidate.
-        """
+        """Return scores by setting, then matcher. Raises KeyError for an unknown candidate."""
         scores: list[Score] = []
         for setting, goal in self._goals.items():
             matches = [match_plan(goal, plan, matcher) for matcher in matchers]

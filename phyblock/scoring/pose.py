@@ -33,8 +33,7 @@ from phyblock.types import StepEnd
 
 
 def cheapest(cost: Floats) -> list[tuple[int, int]]:
-    """Pairs of row and column with the least total cost, one for each row or column of the shorter
-    side, by row.
+    """Pairs of row and column with the least total cost, one for each of the shorter side, by row.
 
     Shortest augmenting paths with potentials (Jonker and Volgenant, *A shortest augmenting path
     algorithm*, Computing 38, 1987). Among equal totals it takes the same one on every machine.
@@ -79,17 +78,12 @@ _SLACK = 1e-6
 _DISTANCE_COST = 1e-3
 _IMPOSSIBLE = 1e3
 _MOST_SETS = 4000
-"""Sets of placed blocks that are kept after a step, the cheapest ones; plans in a valid order need
-no search at all.
-"""
+"""Cheapest sets of placed blocks kept after a step; plans in a valid order need no search."""
 
 
 @dataclass(frozen=True)
 class Nearness:
-    """Steps against goal blocks, arrays of shape (steps, blocks): distance [cm], turn [degrees].
-
-    `equal` is true where the step's candidate equals the block.
-    """
+    """Steps against goal blocks, (steps, blocks): distance [cm], turn [degrees], equal or not."""
 
     distance_cm: Floats
     turn_deg: Floats
@@ -316,8 +310,7 @@ def _turned(points: Floats, turns_rad: Floats) -> Floats:
 PoseFrame = Literal["absolute", "aligned"]
 POSE_FRAMES: tuple[PoseFrame, ...] = get_args(PoseFrame)
 """`absolute`: the plan as given. `aligned`: after the best shift along the floor and turn about the
-vertical of the whole plan, or as given if no motion scores higher.
-"""
+vertical of the whole plan, or as given if no motion scores higher."""
 _CM = 100.0
 _FIT_DIGITS = 4
 _MOST_COUNTED = 8
@@ -341,11 +334,7 @@ class PoseFit:
 
 @dataclass(frozen=True)
 class PoseScore:
-    """One plan in one frame.
-
-    `fits` has the fit of each step, None for an unmatched one; `right` the number of right steps at
-    each of `TOLERANCES_CM`.
-    """
+    """A plan in a frame: the fit of each step (None: unmatched), right ones by `TOLERANCES_CM`."""
 
     frame: PoseFrame
     fits: tuple[PoseFit | None, ...]
@@ -355,10 +344,7 @@ class PoseScore:
 
 
 class PoseScorer:
-    """Scores plans with poses for one scene; build once, use for every model and seed.
-
-    Steps have the orientation of their candidates.
-    """
+    """Scores plans with poses for one scene; build once, use for every model and seed."""
 
     def __init__(self, scene: Scene, candidates: CandidateSet) -> None:
         self._blocks = scene.blocks
@@ -367,9 +353,7 @@ class PoseScorer:
     def score(
         self, numbers: Sequence[int], blocks: Sequence[Block | None]
     ) -> tuple[PoseScore, ...]:
-        """Return the score in each frame of a plan: the number of each step's candidate, and its
-        block at its pose, None if no candidate has the number.
-        """
+        """Return the score in each frame; `blocks` are at their poses, None without a candidate."""
         given = [(n, block) for n, block in zip(numbers, blocks, strict=True) if block is not None]
         if not given:
             fits, none = (None,) * len(numbers), (0,) * len(TOLERANCES_CM)
@@ -454,8 +438,7 @@ kind, or not so often (`wrong_kind`); no such goal block has its orientation (`w
 block that it rests on is missing (`too_early`); its place is farther than `ERROR_TOLERANCE_CM` from
 that of its goal block, mainly sideways or mainly in height (`off_sideways`, `off_height`); it
 overlaps others or the floor (`interpenetrating`); when released, it does not stay (`floating`), or
-others do not (`toppling`).
-"""
+others do not (`toppling`)."""
 ERROR_TOLERANCE_CM = 1.0
 
 
@@ -476,8 +459,7 @@ def pose_errors(
 ) -> tuple[PoseError | None, ...]:
     """Return the error of each step, None for one that is right and stands.
 
-    `numbers` are those of all steps, including numbers that no candidate has; `fits` are those of
-    the plan as given, `ends` those of its execution.
+    `numbers` may be of no candidate; `fits` are of the plan as given, `ends` of its execution.
     """
     placed = 0
     found: list[PoseError | None] = []

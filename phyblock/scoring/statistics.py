@@ -57,10 +57,7 @@ class Clusters:
 
     @classmethod
     def of(cls, parents: Sequence[Sequence[str]]) -> Clusters:
-        """Clusters from the names of the base scenes of each unit; duplicate names count once.
-
-        Raises ValueError for a unit without a base scene.
-        """
+        """Clusters by names of base scenes, once each. Raises ValueError for a unit without any."""
         names = [tuple(dict.fromkeys(unit)) for unit in parents]
         if not all(names):
             raise ValueError("every unit needs a base scene")
@@ -148,15 +145,14 @@ def jackknife(
 def in_range(estimate: Estimate, most: ArrayLike = 1.0) -> Estimate:
     """The same estimates, with Wilson's interval instead of Student's where a range is known.
 
-    Values are from 0 to `most`: 1 for shares, infinity for values that are only never below zero,
-    NaN for no range, which keeps Student's. For a share p with standard error s, the effective
-    number of samples is p (1 - p) / s^2 (Kish), or the number of clusters where every unit agrees
-    and s is uninformative; the interval is that of Wilson (Journal of the American Statistical
-    Association 22, 1927) with Student's quantile (Dean and Pagano, *Evaluating confidence interval
-    methods for binomial proportions in clustered surveys*, Journal of Survey Statistics and
-    Methodology 3, 2015). Any other mean is treated as a share of the end of its range, in the limit
-    if that is infinite. The interval stays in the range and has a width even where nothing varies,
-    unless the range has no end and so no scale.
+    Values are from 0 to `most`: 1 for shares, infinity for values only never below zero, NaN for no
+    range, which keeps Student's. For a share p with standard error s, the effective number of
+    samples is p (1 - p) / s^2 (Kish), or the number of clusters where every unit agrees and s is
+    uninformative; the interval is that of Wilson (Journal of the American Statistical Association
+    22, 1927) with Student's quantile (Dean and Pagano, *Evaluating confidence interval methods for
+    binomial proportions in clustered surveys*, Journal of Survey Statistics and Methodology 3,
+    2015). Any other mean is treated as a share of the end of its range, in the limit if infinite.
+    The interval stays in the range and, if that has an end, has a width even if nothing varies.
     """
     from scipy.special import stdtrit
 
@@ -203,10 +199,9 @@ def detectable(
 ) -> Floats:
     """The difference that a test at `level` finds in `POWER` of cases, in the unit of `se`.
 
-    Bloom, *Minimum detectable effects*, Evaluation Review 19, 1995: the sum of the two quantiles
-    of Student's t, times the standard error. NaN with fewer than two clusters, where it exceeds
-    the `most` that values can differ by, and where no sample differs: a standard error of 0 says
-    nothing about what could be found.
+    Bloom, *Minimum detectable effects*, Evaluation Review 19, 1995: the sum of the two quantiles of
+    Student's t, times the standard error. NaN with fewer than two clusters, beyond the `most` that
+    values can differ by, and where no sample differs, since a standard error of 0 says nothing.
     """
     from scipy.special import stdtrit
 

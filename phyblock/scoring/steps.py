@@ -38,9 +38,8 @@ class Move:
 def gated(scene: Scene, gating: Gating) -> Scene:
     """Return the scene with the dependencies of the gating.
 
-    `aov` is the scene itself: a block waits for those it depends on. Under `layer` it waits for all
-    blocks of lower layers, as in the official code; layers are longest paths of dependencies, with
-    which some official files disagree.
+    `aov` is the scene itself. Under `layer`, a block waits for all lower layers, as in the official
+    code; layers are longest paths of dependencies, with which some official files disagree.
     """
     if gating == "aov":
         return scene

@@ -40,8 +40,7 @@ from phyblock.types import AnswerFormat, CandidateOrder
 
 ENGINE = "physics"
 """Key in a track's identity of the physics engine that affects its results, unless it is the
-reference engine. Results of the engine are in the records.
-"""
+reference engine. Results of the engine are in the records."""
 EXECUTION = "execution"
 """Key of the version of plan execution and its measurements."""
 
@@ -222,10 +221,7 @@ class Track(ABC):
     def __init__(
         self, suite: Suite, dataset: Dataset, limit: int | None = None, shop: Workshop | None = None
     ) -> None:
-        """Open the track on at most `limit` items; without a shop it makes no requests.
-
-        Raises SpecError, DataError or PromptError for invalid input.
-        """
+        """Open at most `limit` items; makes no requests without a shop. Raises InputError."""
         self.suite, self.dataset, self.limit, self.shop = suite, dataset, limit, shop
         self.spec: Any = None if self.options is None else suite.section(self.options)
         self.is_blind = isinstance(self.spec, PictureControls) and self.spec.blind
@@ -335,10 +331,7 @@ class Track(ABC):
         raise NotImplementedError
 
     def counts(self, item: Any, record: Record) -> dict[str, tuple[float, ...]]:
-        """Return the counts of a sample that measures need besides its scores, by name.
-
-        Counts are empty if their measures do not count the sample.
-        """
+        """Return the counts of a sample besides its scores, by name; empty if it does not count."""
         return {
             one.name: tuple(map(float, one.sample(item, record) or ()))
             for one in self._counted
@@ -361,10 +354,7 @@ class Track(ABC):
         with_messages: bool,
         earlier: Record | None = None,
     ) -> Episode:
-        """Return an episode that has not begun.
-
-        Results that replies alone do not determine, such as falls, come from an `earlier` record.
-        """
+        """Return a new episode; results such as falls come from an `earlier` record, if given."""
         raise NotImplementedError
 
     def identity(self) -> dict[str, Any]:
@@ -533,18 +523,13 @@ def select_tasks(
 
 
 def limited(items: Sequence[_T], strata: Sequence[int], limit: int | None) -> tuple[_T, ...]:
-    """Return at most `limit` items in their order, spread evenly over their strata and in each.
-
-    A higher limit keeps all items of a lower one.
-    """
+    """Return at most `limit` items in order, spread evenly over strata; higher limits keep them."""
     kept = set(fair_order(strata)[:limit])
     return tuple(item for position, item in enumerate(items) if position in kept)
 
 
 def interleaved(items: Sequence[ItemT]) -> list[ItemT]:
-    """Return items in an order in which the first few are always a fair sample of levels and
-    scenes.
-    """
+    """Return items in an order whose first few are always a fair sample of levels and scenes."""
     return [items[position] for position in fair_order([item.scene.level for item in items])]
 
 

@@ -97,17 +97,15 @@ _THRESHOLDS = (0.0, 0.1, 0.14, 0.18, 0.23, 0.3, 0.4)
 _SIDE_PX = 128
 """Side of the pictures in which colors are measured [pixels]."""
 Areas = Mapping[str, float]
-"""Share of each color in the area of blocks in a picture; colors that it does not show are absent.
-"""
+"""Share of each color in the area of blocks in a picture; colors not shown are absent."""
 
 
 @dataclass(frozen=True)
 class Unit:
     """A group of candidates that are equal under a setting: one in A, all of a kind in B.
 
-    `numbers` are those of its candidates, `candidate` is the first of them. `poses` is how many
-    candidates its kind has, `rank` its place among them from 0. `area` is the share of its color in
-    the picture of the goal, if known.
+    `numbers` are its candidates', `candidate` the first; `poses` is how many its kind has, `rank`
+    its place among them from 0, `area` the share of its color in the goal's picture, if known.
     """
 
     numbers: tuple[int, ...]
@@ -165,9 +163,8 @@ def goal_blind_plans(
 ) -> dict[str, Plan]:
     """Return for each scene a plan learned from unrelated scenes.
 
-    Every combination of key, threshold and order is a way to make plans; each scene uses the way
-    that scores best on the unrelated scenes. Without `repeats` no candidate is named twice. `areas`
-    are those of the colors of each goal, by scene.
+    Each combination of key, threshold and order makes plans; a scene uses the one that scores best
+    on unrelated scenes. Without `repeats` no candidate is named twice. `areas` are the goals'.
     """
     if not scenes:
         return {}

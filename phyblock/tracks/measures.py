@@ -102,11 +102,10 @@ class SampleCounts:
 class Measure:
     """One number about a model.
 
-    `value` computes it from summed counts, shape (..., columns of `counted`), NaN where it is not
-    defined. `heading`, `meaning` and `over` (the noun of what is counted) are for people; `unit`
-    "%" means values in [0, 1] that tables show times 100. A measure that `is_difference` of two
-    shares may be below zero. Values in another unit are from 0 to `most` if that is given, infinity
-    for no limit.
+    `value` computes it from summed counts, shape (..., columns of `counted`), NaN where undefined.
+    `heading`, `meaning` and `over` (the noun of what is counted) are for people; `unit` "%" means
+    values in [0, 1] that tables show times 100. A measure that `is_difference` of two shares may be
+    below zero. Values in another unit are from 0 to `most` if given, infinity for no limit.
     """
 
     name: str
@@ -194,10 +193,7 @@ class LayoutColumn:
 
 @dataclass(frozen=True)
 class Layout:
-    """A table with a row per model or, by `rows`, per model and cell or per model and measure.
-
-    If `drawn`, its shares are also drawn as a figure.
-    """
+    """A table by model or, by `rows`, by model and cell or measure; if `drawn`, also a figure."""
 
     caption: str
     columns: Sequence[LayoutColumn]
@@ -211,12 +207,11 @@ class TrackReport:
     """The measures of a track and their presentation.
 
     `cells` are those of a suite and its run; the last is the whole. `headline` are the columns that
-    models are ranked by; if it is empty, the first measure in every cell. `notes` explain how
-    values are counted: Jinja templates with the variables `suite`, `spec` (the track's section of
-    it) and `manifest`; empty results are dropped. `floors` names baselines that never see the goal,
-    `short` the column of `Run.summary`, `success` the measure that is 1 if a sample is wholly
-    right. `chance` is the main measure of guessing in a cell that is not a mean. `part_names`
-    explain `Record.part`.
+    models are ranked by; if empty, the first measure in every cell. `notes` explain how values are
+    counted: Jinja templates with the variables `suite`, `spec` (the track's section of it) and
+    `manifest`; empty results are dropped. `floors` names baselines that never see the goal, `short`
+    the column of `Run.summary`, `success` the measure that is 1 if all is right. `chance` is the
+    main measure of guessing in a cell that is not a mean. `part_names` explain `Record.part`.
     """
 
     measures: tuple[Measure, ...]

@@ -74,8 +74,7 @@ class Drawing:
 class Workshop:
     """Draws pictures and does other long work in processes, which start on first use.
 
-    Pictures are kept in `folder` by content, and the last ones in memory. `rendered` counts the
-    pictures drawn by this object.
+    Pictures are kept in `folder` by content, the last in memory; `rendered` counts those drawn.
     """
 
     def __init__(self, workers: int = 0, folder: Path | None = None) -> None:
@@ -92,8 +91,7 @@ class Workshop:
     async def compute(self, work: Callable[[], _Result]) -> _Result:
         """Return the result of `work`, a `partial` of a module-level function, in a worker process.
 
-        If a process is killed, the work is repeated alone. Raises SimulationError if it is killed
-        again.
+        Work that is killed is repeated alone. Raises SimulationError if it is killed again.
         """
         from concurrent.futures.process import BrokenProcessPool
 
@@ -125,11 +123,7 @@ class Workshop:
         return tuple([await self._image(one) for one in drawings])
 
     def outlines(self, drawings: Sequence[Drawing]) -> tuple[Image, ...]:
-        """Return the pictures that are in memory or the cache, and for others empty ones of their
-        sizes.
-
-        Raises DataError for a file that is not a picture.
-        """
+        """Return pictures in memory or cache, else empty ones of their size; raises as `images`."""
         return tuple(self._kept(one) or Image(b"", one.label, *one.size_px) for one in drawings)
 
     def close(self) -> None:
@@ -181,10 +175,7 @@ class Workshop:
 
 
 class LocalShop(Workshop):
-    """Draws and works in the calling process and thread; its coroutines never wait.
-
-    So a coroutine of a track can run to its end without an event loop, in any thread.
-    """
+    """Draws and works in the calling thread; its coroutines never wait and need no event loop."""
 
     _one_at_a_time = threading.Lock()
 

@@ -64,8 +64,7 @@ Center = tuple[float, float, float]
 _REACHED = {"reached_cm": 1.0, "reached_deg": 10.0}
 _LIMITS = {**asdict(ExecutionLimits()), **_REACHED}
 """Tolerances of execution, as records hold them: a goal block is reached if a block of its kind
-ends up at most `reached_cm` from it, turned by at most `reached_deg`.
-"""
+ends up at most `reached_cm` from it, turned by at most `reached_deg`."""
 _DIGITS = 4
 _RANDOM_STEPS = 4
 _RANDOM_REACH_CM = 15.0
@@ -91,9 +90,7 @@ class GivenStep(Line):
 
 
 class PoseParse(PlanParse):
-    """The plan with poses that was parsed from a reply; `plan` omits numbers that no candidate
-    has.
-    """
+    """The plan with poses of a reply; `plan` omits numbers that no candidate has."""
 
     steps: tuple[GivenStep, ...] = ()
     """The steps with their poses, including those that name no candidate."""

@@ -57,8 +57,7 @@ class VqaSpec(PictureControls):
     """builtin: a folder with questions.jsonl. official: a folder with question files in the
     official JSON form and their pictures."""
     path: Annotated[str, Field(min_length=1)] = BUILTIN_QUESTIONS
-    """Name of a bundled question set (phyblock-vqa), or a folder, relative as in dataset.path. Its
-    scenes are those of dataset."""
+    """A bundled set (phyblock-vqa) or a folder, as in dataset.path; about the scenes of dataset."""
     subtasks: UniqueSome[SubtaskName] = (*SUBTASKS,)
     """Subtasks to ask about."""
     circular: Flag = False
@@ -162,9 +161,7 @@ _HEADINGS = ("Property", "Relationship", "Scene", "Dynamics")
 
 
 def cells_of(suite: Suite, manifest: Manifest) -> tuple[Cell, ...]:
-    """Return the cells of the subtasks that were asked: those of each category and their mean, as
-    in Table 2, then the mean of all.
-    """
+    """Return subtasks' cells by category, with its mean as in Table 2, then the overall mean."""
     counts = manifest.tracks.get("vqa", {}).get("by_subtask", {})
     asked = counts or suite.section(VqaSpec).subtasks
     cells: list[Cell] = []
@@ -206,10 +203,7 @@ _COLUMNS = (*(f"{kind}_{letter.lower()}" for kind, letter in _LETTERS), "n")
 
 @dataclass(frozen=True)
 class ChoiceSubject:
-    """A presented question that baselines and people answer.
-
-    `guess` returns the answer of `majority_rule`: 0-based indices as in `question.answer`.
-    """
+    """A presented question for baselines and people; `guess` answers it by `majority_rule`."""
 
     question: Question
     guess: Callable[[], tuple[int, ...]] = field(compare=False)
@@ -224,10 +218,9 @@ FOLDS = 5
 class Folds:
     """Questions dealt into five folds in turn, by their first base scene.
 
-    Those of a fold are answered by rules learned from questions that share no base scene with it.
-    If answers are balanced over the whole set, such a rule scores below chance: an option that is
-    right more often in the known questions is right less often in the others. Only a score above
-    chance indicates a shortcut.
+    A fold is answered by rules learned from questions that share no base scene with it. If answers
+    are balanced over the whole set, such rules score below chance: an option right more often in
+    known questions is right less often in others. Only a score above chance indicates a shortcut.
     """
 
     def __init__(self, questions: Sequence[Question]) -> None:
@@ -244,9 +237,7 @@ class Folds:
 
 
 def guesses_of(questions: Sequence[Question], learn: Callable[[Sequence[Question]], Rule]) -> Rule:
-    """Return the rule that answers questions of a set, or rotations of them, by the rules that
-    `learn` returns for questions about other scenes.
-    """
+    """Return a rule that answers by those that `learn` returns for questions about other scenes."""
     folds = Folds(questions)
 
     @functools.cache
@@ -393,8 +384,7 @@ class Vqa(Track):
     def draw(self, item: AskedQuestion) -> tuple[Drawing, ...]:
         """Return the pictures of a question: scene, the block by itself if there is one, options.
 
-        A background of the suite overrides those of questions. Raises DataError for a missing
-        picture.
+        A suite's background overrides questions'. Raises DataError for a missing picture.
         """
         images, n, files = self.suite.images, len(item.question.options), item.task.files
         recipes = {recipe.label: recipe for recipe in item.question.pictures}

@@ -430,8 +430,7 @@ class StepEpisode:
     async def request(self) -> Request | None:
         """Return the next request, or None when the episode has ended.
 
-        After a step that placed a block, all are released; blocks that fall are put back, or end
-        the episode.
+        After a step that placed a block, all are released; those that fall are put back, or end it.
         """
         track, task, assembly = self._track, self._task, self._assembly
         blocks = tuple(task.scene.blocks[vertex] for vertex in assembly.vertices)
