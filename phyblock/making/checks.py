@@ -30,8 +30,7 @@ from phyblock.sim.pictures import LEAST_SHOWN, PictureStyle, hidden_blocks, visi
 class Finding(Problem):
     """One problem of the scene `where`, found by a check, with a sentence that describes it.
 
-    `blocks` are orders of blocks, 0 the ground. `allowed` is what geometry, physics or a limit
-    requires.
+    `blocks` are orders, 0 the ground; `allowed` is what geometry, physics or a limit requires.
     """
 
     check: str = ""
@@ -59,9 +58,8 @@ LEVEL_LIMITS: dict[int, Limits] = {
 class SceneFacts:
     """A scene with cached facts for its checks; without `candidates`, checks of them find nothing.
 
-    Overlaps and gaps may be up to `fit_m` [m]. The finished structure is simulated to the end of
-    the `trial`, or until it is at rest for `quiet_s` [s]; earlier steps only at the first of the
-    trial's time steps.
+    Overlaps and gaps may be up to `fit_m` [m]. The finished structure is simulated for the `trial`,
+    or until at rest for `quiet_s` [s]; earlier steps only at the trial's first time step.
     """
 
     scene: Scene
@@ -247,19 +245,14 @@ FOREIGN_CHECKS = (*PHYSICS, "layer", "order", "candidates")
 
 
 def findings_of(facts: SceneFacts, names: Iterable[str]) -> Iterator[Finding]:
-    """Yield the findings of these checks, each computed on demand.
-
-    Raises SimulationError as the simulator does.
-    """
+    """Yield the findings of these checks, each computed on demand; raises as the simulator does."""
     for name in names:
         for found in CHECKS[name](facts):
             yield replace(found, where=facts.scene.id, check=name)
 
 
 def is_acceptable(scene: Scene, palette: tuple[Kind, ...]) -> bool:
-    """True if a scene could enter a data set: proven to stand, with margins, and
-    with each of its blocks visible in the goal picture. The check ends at the first fault.
-    """
+    """True if a scene could enter a set: proven to stand with margins, each block visible."""
     facts = SceneFacts(scene, palette=palette)
     found = findings_of(facts, (*FORM, "hidden", *PHYSICS))
     return (
@@ -279,9 +272,7 @@ def verify_scene(task: Task) -> tuple[Finding, ...]:
 
 
 def verify_foreign(task: Task, trial: Trial = DEFAULT_TRIAL) -> tuple[Finding, ...]:
-    """Return the findings about a scene of the official data and its candidate set, whose positions
-    were written by hand in rounded millimeters.
-    """
+    """Return findings on a task of the official data, whose positions are rounded millimeters."""
     # 2 mm cannot be seen in a picture.
     facts = SceneFacts(*task, fit_m=0.002, trial=trial, quiet_s=0.5)
     return tuple(findings_of(facts, FOREIGN_CHECKS))

@@ -41,11 +41,7 @@ QUESTION_FILES = ("CARD.md", "questions.jsonl", VERSION_FILE)
 PICTURES = "pictures"
 """Folder of the pictures of a set of questions that stores them."""
 SCENE_SET_VERSION = 5
-"""Increased whenever the same seed makes other scenes or candidate sets: 2 offers distractors as
-often as goals need them, and shows at least 3 % of every block's outline; 3 excludes scenes of the
-built-in set; 4 accepts only finished structures that are proven to stand; 5 simulates with more
-iterations of the contact solver.
-"""
+"""Increased whenever the same seed makes other scenes or candidate sets."""
 QUESTION_SET_VERSION = 12
 """Increased whenever questions with the same name change, so that results are never mixed."""
 _Tasks = Sequence[tuple[Scene, CandidateSet]]
@@ -70,9 +66,7 @@ def write_questions(
     card: str,
     pictures: Iterable[str] = (),
 ) -> None:
-    """Write questions in their order; `originals` are the scenes as stored, by id, and `pictures`
-    the names of picture files that are already there.
-    """
+    """Write questions in order; `originals` are scenes as stored, `pictures` files there."""
     lines = (StoredQuestion.of(q, originals[q.scene.id]).as_json() for q in questions)
     texts = (card, "".join(f"{line}\n" for line in lines))
     _write(folder, QUESTION_FILES, texts, QUESTION_SET_VERSION, pictures)
@@ -243,10 +237,7 @@ def commit_season(folder: Path, arguments: str, public: str) -> tuple[Path, Path
 
 
 def reveal_season(commitment: Path, secret: Path, public: str) -> tuple[str, int]:
-    """Return the arguments and the seed of a season whose public value is known.
-
-    Raises DataError for a secret, code or engine other than the one committed to.
-    """
+    """Return a season's arguments and seed. Raises DataError for another secret, code or engine."""
     where = str(commitment)
     committed = decode(TypeAdapter(Commitment), read_data(commitment), where, Commitment)
     revealed = read_data(secret).decode("ascii", "replace").strip()

@@ -279,9 +279,8 @@ _FLAT_M, _LEAST_TOP_M, _HIGHEST_M = 0.0005, 0.045, 0.2
 class Bench(NamedTuple):
     """A nearly finished structure, with loose blocks to lay along a line over one of its flat tops.
 
-    The first loose block is a plank that lies on the top, the other two are weights on the plank: a
-    balance, or a cantilever held by a weight. Offsets along the line count from the middle of the
-    top.
+    The first loose block is a plank that lies on the top, the others are weights on it: a balance,
+    or a cantilever held by a weight. Offsets along the line count from the middle of the top.
     """
 
     base: tuple[Block, ...]
@@ -332,9 +331,7 @@ class Bench(NamedTuple):
 
 
 def free_tops(blocks: Sequence[Block]) -> list[Block]:
-    """Return the blocks, square to the axes and not too high, with a flat top on which nothing
-    rests.
-    """
+    """Return blocks that are square to the axes, not too high, and free on a flat top."""
     carrying = {order for block in blocks for order in block.depend}
     tops = []
     for block in blocks:
@@ -387,8 +384,7 @@ _ELEVATIONS_DEG = (20, 38)
 _LEAST_ACROSS, _ON_A_PILLAR = 0.5, 0.8
 _LEAN = 2.0 * math.tan(math.radians(LEAN_DEG))
 """Slope of a floor on which the right plank also stays: twice the tilt of simulations, which
-release all blocks at once.
-"""
+release all blocks at once."""
 _LEANS = ((_LEAN, 0.0), (-_LEAN, 0.0), (0.0, _LEAN), (0.0, -_LEAN))
 _PLANS, _FOURS = 400, 4000
 _OVER = (0, 1, 1, 2, 2, 2)
@@ -458,11 +454,10 @@ def _next_steps(scene: Scene, ranks: Ranks, rng: np.random.Generator) -> Draft |
 
 
 def four_plans(on: Bench, ranks: Ranks, rng: np.random.Generator) -> list[list[float]]:
-    """Return four plans, or none: in the first, the center of mass is over the support, in the
-    others beyond it, with margins.
+    """Return four plans or none: only the first has its center of mass over the support, clearly.
 
-    The first has these ranks by the overhang of the plank, and by the distance of the center of
-    mass from the middle of the structure.
+    Its `ranks` are by the overhang of the plank, and by the distance of the center of mass from the
+    middle of the structure.
     """
     near, far = on.limits_m
     plans = on.plans_m(_PLANS, rng)
@@ -477,9 +472,7 @@ def four_plans(on: Bench, ranks: Ranks, rng: np.random.Generator) -> list[list[f
 
 
 def one_stays(stays: NDArray[np.bool_], falls: NDArray[np.bool_], rng: np.random.Generator) -> Ints:
-    """Return random fours, (n, 4), of which the first stays and the others fall; empty if there are
-    none.
-    """
+    """Return random fours, (n, 4), or none, in which the first stays and the others fall."""
     if not stays.any() or not falls.any():
         return np.empty((0, len(LETTERS)), dtype=np.int64)
     wrong = rng.choice(np.flatnonzero(falls), size=(_FOURS, len(LETTERS) - 1))
@@ -595,9 +588,7 @@ def _set_down(scene: Scene, rank: int, rng: np.random.Generator) -> Draft | None
 def _with_plank(
     blocks: tuple[Block, ...], at_m: Floats, first: int, across: int, rng: np.random.Generator
 ) -> tuple[Block, ...]:
-    """Return blocks with a plank on up to two pillars, and others beside it or on it; unchanged if
-    one of these would not clearly stay.
-    """
+    """Return blocks with a plank on up to two pillars and others by it, or unchanged if unsure."""
     offs_m, thick_m = pick(rng, _PILLARS_M)
     along = across if len(offs_m) == 1 else int(rng.integers(2))
     pillar: Turned = pick(rng, pillars(along, thick_m))
@@ -710,8 +701,7 @@ def _out_m(at_m: Floats, low_m: Floats, high_m: Floats) -> Floats:
 def four_of(
     plain: QuestionPicture, points: Points, outcomes: Ints, rank: int, rng: np.random.Generator
 ) -> tuple[list[int], str]:
-    """Return points on four blocks, of which the first is right, and their kind; empty if there
-    are none.
+    """Return points on four blocks, the first of them right, or none, and their kind.
 
     The kind has the ranks of the right one: `rank` by distance from the middle of its block, then
     by height, and by distance to the nearest higher block.

@@ -133,8 +133,7 @@ def _extent(mask: Mask) -> list[float]:
 
 
 def text_features(text: str, options: Sequence[str]) -> list[Mapping[str, float]]:
-    """Return features of each option relative to the others and to the question's text, by name; a
-    missing one is 0.
+    """Return each option's features relative to the others and the question, by name, 0 if missing.
 
     These are the known shortcuts of multiple-choice questions: words that are often right, the
     largest or the middle number, the option that shares most with the others, the longest one.
@@ -302,10 +301,7 @@ class SubtaskAudit:
 
 
 def audit_questions(questions: Sequence[Question]) -> Iterator[SubtaskAudit]:
-    """Yield an audit of each subtask that has questions, in the paper's order.
-
-    Raises SpecError if scikit-learn, which the text probe uses, is not installed.
-    """
+    """Yield subtasks' audits in the paper's order. Raises SpecError without scikit-learn."""
     folds = Folds(questions)
     rules = {"majority": majority_rule, "text": text_rule}
     readers = {name: guesses_of(questions, rule) for name, rule in rules.items()}
@@ -337,10 +333,9 @@ def audit_questions(questions: Sequence[Question]) -> Iterator[SubtaskAudit]:
 
 
 def text_rule(known: Sequence[Question]) -> Rule:
-    """Return the rule that picks the option with the highest odds of a logistic regression over
-    words, numbers and likeness of texts; for an order, the most frequent one.
+    """Return the rule that picks the likeliest option by logistic regression over its words.
 
-    Raises SpecError if scikit-learn is not installed.
+    For an order, it picks the most frequent one. Raises SpecError without scikit-learn.
     """
     majority = majority_rule(known)
     single = [question for question in known if len(question.answer) == 1]
@@ -372,8 +367,7 @@ def text_rule(known: Sequence[Question]) -> Rule:
 def duplicates_of(questions: Sequence[Question]) -> dict[str, str]:
     """Return the ids of questions that repeat an earlier one, each with the id of that one.
 
-    Questions are equal if a reader sees the same, on any background, with blocks and options
-    listed in any order.
+    Equal questions look the same but for the background and the order of blocks and options.
     """
     first: dict[Hashable, str] = {}
     found: dict[str, str] = {}

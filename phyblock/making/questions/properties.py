@@ -1,8 +1,7 @@
 """SH, CO, SI: shape, color and size of a block. NU, OC, LC, TC: numbers of blocks, layers, shapes.
 
 Scenes are recolored, so that neither color nor shape reveals the other. For sizes, blocks are named
-by color and side, because a shape's name would reveal its size. Counts go by what the picture
-shows.
+by color and side, because a shape's name would reveal its size. Counts go by the picture.
 """
 
 from __future__ import annotations
@@ -194,8 +193,7 @@ def sure_blocks(picture: QuestionPicture) -> int:
 
     At least the share `COUNTED` of each block is visible, except for at most one. That one must be
     there, whatever it is, if a block of which `NAMED` is visible rests on it alone, and would
-    otherwise float. Raises UnfairError if more blocks are hidden, or nothing shows that one is
-    needed.
+    otherwise float. Raises UnfairError if more are hidden, or nothing shows that one is needed.
     """
     seen = sight.sizes(picture).shown
     hidden = [order for order, share in seen.items() if share < sight.COUNTED]

@@ -66,8 +66,7 @@ _RANKED: Mapping[str, Callable[[Block, Floats], float]] = {
     "rp-back": lambda block, away: -float(sight.center_m(block) @ away),
 }
 """Measures of the blocks that are asked for, from a block and the direction away from the viewer;
-the least is right.
-"""
+the least is right."""
 
 
 class PositionMaker(StaticMaker):
@@ -171,10 +170,7 @@ _LADDERS: Sequence[Sequence[str]] = base.WORDS["distances"]
 
 
 class DistanceMaker(StaticMaker):
-    """AP: heights and distances in centimeters, on the blocks' grid.
-
-    A block whose size the prompt gives is in the picture as the scale.
-    """
+    """AP: heights and distances in centimeters, on the grid; a block of known size is the scale."""
 
     subtask: Subtask = "AP"
 

@@ -1,8 +1,7 @@
 """Facts that a picture shows: the visible share and place of each block, and names of blocks.
 
 An expression is `[side] [color] noun [in layer N] [resting on the [color] noun]`. `resolve` finds
-what it means to a reader from the text again, so that a question can be checked from its words
-alone.
+what it means from the text again, so that a question can be checked by its words alone.
 """
 
 from __future__ import annotations
@@ -83,9 +82,7 @@ def goal_picture(scene: Scene, view: View) -> QuestionPicture:
 
 
 def recolored(scene: Scene, view: View, rng: np.random.Generator) -> QuestionPicture:
-    """Return the picture of the scene with each block in a random one of three colors, so that
-    colors do not reveal shapes.
-    """
+    """Return the picture with blocks in three random colors, so that colors reveal no shapes."""
     colors = palette(rng)
     drawn = [colors[i] for i in rng.integers(len(colors), size=len(scene))]
     by_order = dict(zip(orders_of(scene.blocks), drawn, strict=True))
@@ -118,9 +115,7 @@ def height_m(block: Block) -> float:
 
 
 class Sizes(NamedTuple):
-    """By a block's order, its visible share, its share of the picture, and its left and right end
-    in the picture (-1 to 1).
-    """
+    """By order: visible share, share of the picture, left and right end in that (-1 to 1)."""
 
     shown: Mapping[int, float]
     area: Mapping[int, float]
@@ -161,9 +156,7 @@ def are_seen(picture: QuestionPicture, least: float, orders: Collection[int] | N
 def require_seen(
     picture: QuestionPicture, least: float, blocks: Sequence[Block] | None = None
 ) -> Sequence[Block]:
-    """Return the given blocks, by default all. Raises UnfairError that names those of which less
-    than `least` is visible.
-    """
+    """Return the blocks, by default all. Raises UnfairError for those seen less than `least`."""
     blocks = picture.blocks if blocks is None else blocks
     shown = orders_of(seen_blocks(picture, least))
     if hidden := sorted(set(orders_of(blocks)).difference(shown)):
@@ -252,10 +245,7 @@ def are_told_apart(pictures: Sequence[QuestionPicture]) -> bool:
 
 
 def marked(picture: QuestionPicture, letter: str) -> tuple[tuple[float, float, float], int]:
-    """Return a mark's place [m], and the order of the block that is visible there.
-
-    Raises UnfairError if there is none.
-    """
+    """Return a mark's place [m] and its visible block's order. Raises UnfairError without one."""
     shot = seen(replace(picture, marks=()))
     for mark in picture.marks:
         order = seen_order(picture, shot, mark.position_m)
@@ -267,10 +257,7 @@ def marked(picture: QuestionPicture, letter: str) -> tuple[tuple[float, float, f
 def highlighted(
     blocks: Sequence[Block], lot: Collection[int], slots: Slots, taken: int | None = None
 ) -> tuple[Block, ...]:
-    """Return the blocks of a lot in the slots' `color`, all others in their `other` color.
-
-    The block that is `taken` has its own color.
-    """
+    """Return a lot's blocks in the slots' `color`, others in `other`, and `taken` in its own."""
     colors: dict[int, Color] = {}
     for order in orders_of(blocks):
         role = "taken" if order == taken else "color" if order in lot else "other"
@@ -281,10 +268,7 @@ def highlighted(
 def lot_of(
     picture: QuestionPicture, blocks: Sequence[Block], slots: Slots, taken: int | None = None
 ) -> frozenset[int]:
-    """Return the orders of the blocks that a picture highlights.
-
-    Raises UnfairError if it shows another structure or other colors.
-    """
+    """Return orders of highlighted blocks. Raises UnfairError for other structures or colors."""
     mine = [block for block in picture.blocks if block.color == slots["color"]]
     lot = frozenset(orders_of(mine)) - {taken}
     if set(highlighted(blocks, lot, slots, taken)) != set(picture.blocks):
@@ -388,9 +372,7 @@ def named(asked: Draft, least: float = NAMED) -> list[Block]:
 
 
 def names(block: Block, picture: QuestionPicture, features: Sequence[Feature]) -> tuple[str, ...]:
-    """Return expressions that fit only this block and use only these features, shortest first;
-    none that merely adds to another.
-    """
+    """Return minimal expressions of these features that fit only this block, shortest first."""
     true = {"color": block.color, "type": shape_word(block.type)}
     known = {name: word for name, word in true.items() if name in features}
     simple: list[dict[str, str]] = [{}, *({name: word} for name, word in known.items())]

@@ -20,8 +20,7 @@ from phyblock.text import drawn_bytes
 
 NEEDED: dict[BlockType, dict[str, float]] = read_own_yaml(Path(__file__).with_name("needed.yaml"))
 """Mean number of looks of a type and pose, over all its colors, that a goal of the grammar needs,
-counted in 1,200 goals. Poses that no goal needs would give themselves away and are not offered.
-"""
+counted in 1,200 goals. Poses that no goal needs would give themselves away and are not offered."""
 _EVEN_SHARE = 0.36
 """Share of the sets that offer a look in which it is needed: 5.76 of 16 on average."""
 _RISING: tuple[tuple[BlockType, ...], ...] = (
@@ -29,14 +28,12 @@ _RISING: tuple[tuple[BlockType, ...], ...] = (
     ("triangle", "semi_cylinder"),
 )
 """Types from those low in goals to those high in them. So naming all candidates as listed is
-already a good building order, and a reader gains nothing by finding a better one.
-"""
+already a good building order, and a reader gains nothing by finding a better one."""
 _TIERS = {block_type: tier for tier, types in enumerate(_RISING) for block_type in types}
 _RARER: dict[BlockType, float] = {"triangle": 0.7}
 """Factors on how often a type is drawn as a distractor. Triangles have one color and six poses: in
-setting B, where poses do not count, all of them are the same block offered repeatedly, and
-leaving some out would pay.
-"""
+setting B, where poses do not count, all of them are the same block offered repeatedly, and leaving
+some out would pay."""
 _MOST_DRAWN = 0.98
 """Upper limit: looks that more than `_EVEN_SHARE` of all goals need are nearly always offered."""
 
@@ -46,9 +43,8 @@ def make_candidates(
 ) -> CandidateSet:
     """Return up to `MAX_CANDIDATES` candidates that look different, with all that a scene needs.
 
-    Distractors come from `palette`. Types that are low in goals are listed first, the rest of the
-    order is random. The same scene id and seed give the same set everywhere. Raises DataError if
-    the scene needs more looks than that.
+    Types that are low in goals come first, else the order is random. The same scene id and seed
+    give the same set everywhere. Raises DataError if the scene needs more looks.
     """
     needed: dict[Look, Candidate] = {}
     for block in scene.blocks:

@@ -72,10 +72,7 @@ class ReadScene(NamedTuple):
 
 @dataclass(frozen=True)
 class Completed:
-    """A scene with all that was derived, or its problems.
-
-    `offered` are the candidates if they were given, and `notes` describe anything unusual.
-    """
+    """A scene with all that was derived, or its problems; `notes` describe anything unusual."""
 
     scene: Scene | None = None
     offered: CandidateSet | None = None

@@ -205,8 +205,7 @@ class Production:
     """Produces the scenes of a seed; it keeps 16 bytes per candidate and a request per base scene.
 
     The same arguments give the same scenes with any workers: a candidate depends only on its
-    number, and of two equal ones the lower number is kept. `rejected` counts candidates with a
-    form of `excluded`, in any colors.
+    number, and of equal ones the lowest is kept. `rejected` counts those with a form of `excluded`.
     """
 
     def __init__(
@@ -220,8 +219,7 @@ class Production:
         self._named: Counter[int] = Counter()
 
     def scenes(self, wanted: Sequence[Share]) -> Iterator[Scene]:
-        """Yield accepted scenes: first all base scenes, group by group, then the variations, with
-        further base scenes for those missing if there are too few to vary.
+        """Yield base scenes by group, then variations, with more base scenes for missing ones.
 
         Raises DataError if the rules give no more different scenes.
         """
@@ -314,9 +312,8 @@ def split_tasks(
 ) -> Iterator[AssemblyTask]:
     """Yield an endless series of scenes with candidates, in the proportions of the built-in set.
 
-    Each depends only on its number; only every `step`-th is drawn, from number `first`. Scenes are
-    named by their content, so that one that recurs has the same name. Raises DataError if the
-    rules give no scene that is not `excluded`.
+    Each depends only on its number; every `step`-th is drawn, from number `first`. Names follow
+    from content, so equal scenes have the same name. Raises DataError if all are `excluded`.
     """
     barred = builtin_forms() | excluded
     parts = [(share, part) for share in shares(10_000, levels) for part in (0, 1)]

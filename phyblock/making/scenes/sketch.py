@@ -78,10 +78,7 @@ _LIFT_M = 1.0
 
 
 def lowered(block: Block, onto: Sequence[Block], x_m: float, y_m: float) -> Block:
-    """Return the block lowered in its orientation, the middle of its outline over (x, y) [m].
-
-    It stops where it first touches one of the blocks, or the floor.
-    """
+    """Lower a block, the middle of its outline over (x, y) [m], to the first block or the floor."""
     middle = bounds_m(block).mean(axis=0)
     x, y = (
         float(round(start + to - float(half), 6)) + 0.0
@@ -93,10 +90,7 @@ def lowered(block: Block, onto: Sequence[Block], x_m: float, y_m: float) -> Bloc
 
 
 def make_scene(name: str, levels: tuple[int, ...], blocks: list[Block]) -> Scene:
-    """Return the scene that blocks form, with the middle of its ground plan at the origin.
-
-    Raises CycleError as `scene_of`.
-    """
+    """Return the scene of blocks, its ground plan centered at the origin; raises as `scene_of`."""
     middle_x, middle_y, _ = whole_bounds_m(blocks).mean(axis=0).tolist()
     centered = []
     for block in blocks:
