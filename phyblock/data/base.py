@@ -50,9 +50,7 @@ class Dataset:
         return {task.key: task for task in self.tasks}
 
     def task(self, scene: str, where: str = "", field: str = "scene") -> AssemblyTask:
-        """Return the task of a scene. Raises DataError, at a place and a field that name it, if
-        there is none.
-        """
+        """Return a scene's task. Raises DataError, at this place and field, if there is none."""
         if scene in self._by_scene:
             return self._by_scene[scene]
         allowed, hint = some_of(list(self._by_scene)), did_you_mean(scene, self._by_scene)

@@ -12,10 +12,7 @@ from phyblock.files import bundled, bundled_sets
 
 
 def find_data_set(name: str) -> Path:
-    """Return the folder of `name`: a data set, an official checkout, or a bundled set.
-
-    Raises DataError, listing the bundled sets, if there is no such folder.
-    """
+    """Return the folder of a data set, an official checkout or a bundled set. Raises DataError."""
     path = Path(name)
     if os.path.lexists(path / SCENES_FILE) or (path / "data").is_dir():
         return path
@@ -34,10 +31,7 @@ def open_dataset(layout: str, folder: Path) -> Dataset:
 
 
 def find_questions(name: str) -> Path:
-    """Return the folder of `name`: one with questions, or a bundled set.
-
-    Raises DataError, listing the bundled sets, if there is no such folder.
-    """
+    """Return the folder of `name`, with questions or a bundled set. Raises DataError."""
     path = Path(name)
     return path if path.is_dir() else _file_or_bundled(path, QUESTIONS_FILE, "set of questions")
 

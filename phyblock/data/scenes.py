@@ -1,7 +1,6 @@
 """`scenes.jsonl`: one goal structure and its candidate set per line; see docs/data-format.md.
 
-All layouts use the same types of single values and checks of relations (orders, dependencies,
-layers, looks).
+All layouts use the same types of values and checks of orders, dependencies, layers and looks.
 """
 
 from __future__ import annotations
@@ -197,8 +196,7 @@ class StoredScene(Line, extra="ignore"):
     levels: Levels
     """The levels that the scene counts in: `[1]`, `[2]`, `[3]`, `[4]`, `[5]` or `[1, 2]`."""
     parents: Annotated[tuple[Name, ...], Field(min_length=1, max_length=100)]
-    """The base scenes that it was made from, at least one; a base scene names itself. Statistics
-    cluster by them."""
+    """Its base scenes, at least one, by which statistics cluster; a base scene names itself."""
     blocks: Annotated[SceneBlocks, checked(_layer_faults)]
     """The goal structure: 1 to 40 blocks."""
     candidates: CandidateList[StoredCandidate]

@@ -136,10 +136,9 @@ class Shape:
     lies in the y-z plane, for z in the x-y plane. `fold` is the order of the rotational symmetry
     about the body z axis, and `flips` is true where half turns about axes in the x-y plane map the
     block to itself; every block is its own mirror image in x = 0. `kit_colors` are its colors in
-    the official kit, the first the one that designs use. `poses` are the orientations that designs
-    use, by name, the first by default. `word` is the paper's (appendix A.4). `mistaken_for` are
-    types that a viewer may take a half-hidden one for. `drawn` is a finer profile for pictures of
-    round blocks.
+    the official kit, the first the one that designs use. `poses` are those that designs use, by
+    name, the first by default. `word` is the paper's (appendix A.4). `mistaken_for` are types that
+    a half-hidden one may be taken for. `drawn` is a finer profile for pictures of round blocks.
     """
 
     profile: Profile
@@ -322,8 +321,7 @@ SHAPES: dict[BlockType, Shape] = {
 }
 """The shapes by type. A `ramp+y` slopes down towards +y, a `round+x` has its round side towards +x,
 an arch that is `open+y` stands on one end with its hole towards +y. `x` and `y` name the direction
-of the long side, and for `upright` slabs that of the thin side.
-"""
+of the long side, and for `upright` slabs that of the thin side."""
 
 
 def add_shape(name: str, shape: Shape) -> None:

@@ -256,8 +256,7 @@ class Plan:
 class PoseStep:
     """A candidate, by its 1-based number, and the place to put it.
 
-    `center_cm` is the center of the smallest box with sides along the axes that holds the block in
-    the orientation of its candidate [cm].
+    `center_cm` is the center of its bounding box in its candidate's orientation [cm].
     """
 
     candidate: int
@@ -268,9 +267,8 @@ class PoseStep:
 class AssemblyTask:
     """A goal structure with its candidate set.
 
-    `composite` is the data set's own picture of both, if it has one. If `seed` shuffled the
-    candidates, `candidates` are in the order shown, and `order` has the number of each in the file.
-    The goal is not shown if the task `is_blind`.
+    `composite` is the data set's picture of both, if any. If `seed` shuffled `candidates`, they are
+    as shown, and `order` has their numbers in the file. With `is_blind`, the goal is not shown.
     """
 
     scene: Scene

@@ -109,8 +109,7 @@ def under_way(lines: Iterable[BatchLine], model: str) -> list[Batch]:
 class BatchModel:
     """A Model over a provider's batches, which are sent once no request has arrived for a while.
 
-    `client` makes a client from an HTTP client; it writes requests and reads answers as in direct
-    calls.
+    `client` makes a client from an HTTP client, which writes and reads as in direct calls.
     """
 
     config: ModelConfig
@@ -256,9 +255,7 @@ class BatchModel:
     # A batch from its draft to its answers.
 
     async def _take_through(self, batch: Batch) -> None:
-        """Send a complete draft, and wait for the answers of a batch. A lost or refused batch ends
-        without answers.
-        """
+        """Send a complete draft; wait for answers of a batch, which may be lost or refused."""
         short_s = min(1.0, 4 * self.files.poll_s)
         if batch.event is None:
             while self._is_writing or time.monotonic() < batch.grown_s + (
@@ -396,9 +393,7 @@ def custom_id(batch: Batch, place: int) -> str:
 
 
 def answers_of(lines: bytes, provider: BatchProvider, batch: Batch) -> dict[str, Answer | str]:
-    """Return the first readable answer to each request of a batch that has one, or a text on why
-    the request was never processed.
-    """
+    """Return the first readable answer to each request, or a text on why it was not processed."""
     keys = {custom_id(batch, place): key for place, key in enumerate(batch.most_usd)}
     found: dict[str, Answer | str] = {}
     for line in filter(None, map(bytes.strip, lines.splitlines())):

@@ -83,9 +83,7 @@ class BatchProvider(ABC):
         """Return the line of a request from the body and headers of a direct call."""
 
     async def create(self, token: str, lines: Sequence[bytes]) -> BatchStatus:
-        """Create a batch. Raises UnavailableError with `sent="maybe"` if it may exist all the same,
-        so that creating it again could be paid twice.
-        """
+        """Create a batch. Raises UnavailableError (`sent="maybe"`) if it may exist all the same."""
         try:
             post = await self._prepare(token, lines)
         except ModelError as error:

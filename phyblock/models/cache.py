@@ -59,11 +59,10 @@ def reply_key(config: ModelConfig, request: Request) -> str:
 class ReplyCache(contextlib.AbstractContextManager["ReplyCache"]):
     """Replies by key, in one SQLite file that several processes may have open.
 
-    Two processes that send the same request at the same time may both pay for it; the later reply
-    is kept. Within a process `shared` prevents that. Raises StoreError for a file that is broken,
-    foreign or cannot be used. With `report`, which runs set, failures after opening are reported,
-    and the run continues without the cache: replies are in its records too. An unreadable row
-    counts as missing.
+    Two processes that send the same request at once may both pay for it; the later reply is kept.
+    Within a process `shared` prevents that. Raises StoreError for a file that is broken, foreign or
+    unusable. With `report`, which runs set, later failures are reported, and the run continues
+    without the cache: replies are in its records too. An unreadable row counts as missing.
     """
 
     def __init__(self, path: Path, report: Callable[[str], None] | None = None) -> None:

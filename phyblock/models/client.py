@@ -123,9 +123,7 @@ _THINKING = re.compile(r"\s*<(think|thinking)>(.*?)</\1>\s*(.*)", re.DOTALL)
 
 @dataclass(frozen=True)
 class KeyStatus:
-    """The state of a model's key: the `variables` that are checked, in order, the `key` in the
-    first that holds one, and whether calls fail without.
-    """
+    """A model's key: the `variables` checked, in order, the first `key`, and if calls need it."""
 
     variables: tuple[str, ...]
     key: str | None = field(repr=False)
@@ -187,10 +185,9 @@ def server_address(model_id: str) -> str | None:
 def secrets_of(config: ModelConfig) -> tuple[str, ...]:
     """Return the values that no stored text may contain, longest first.
 
-    They are the model's key, and all environment variables named as a key, token, secret, password
-    or credential, since litellm signs in with many of them. Values of fewer than 4 characters (8
-    for others than the model's key) and common words for "no key" are excluded: removing them would
-    ruin texts and hide nothing.
+    They are the model's key and environment variables named as a key, token, secret, password or
+    credential, since litellm signs in with many. Values of fewer than 4 characters (8 if not the
+    model's key) and common words for "no key" are excluded: removing them would ruin texts.
     """
     own = api_key_status(config).variables
     secrets = {
@@ -230,9 +227,8 @@ def hidden(text: str, secrets: Iterable[str], *, guess: bool = True) -> str:
 def _forms(secrets: tuple[str, ...]) -> tuple[str, ...]:
     """Return all forms in which a server, a library or a log may write one of the secrets.
 
-    The longest come first, since one may begin another. In base64 a secret is found at any place in
-    the encoded bytes, also in `user:key`; the characters at either end that also depend on its
-    neighbors are omitted.
+    The longest come first, since one may begin another. In base64 a secret is found anywhere in the
+    encoded bytes, also in `user:key`; characters that also depend on neighbors are omitted.
     """
     forms: set[str] = set()
     for secret in secrets:
@@ -341,8 +337,7 @@ class HttpClient:
     ) -> Answer:
         """Send once and read the answer.
 
-        Raises RetryableError if no connection could be made in time, if it was lost, or if the
-        answer did not end in time.
+        Raises RetryableError if the connection failed or was lost, or the answer ended too late.
         """
         import aiohttp
         import yarl

@@ -48,8 +48,7 @@ _MOST_TIMES_EXPECTED = 100
 
 
 def tariff_of(config: ModelConfig) -> Tariff | None:
-    """Return the price of a model: its own, else that of litellm's map, else None. Baselines and
-    recordings cost nothing.
+    """Return a model's price, or that in litellm's map, or None; baselines and recordings are free.
 
     Batches without a price cost half at the provider's own address, and the full price elsewhere.
     """
@@ -76,9 +75,7 @@ def is_free(tariff: Tariff) -> bool:
 
 
 def cost_usd(tariff: Tariff | None, reply: Reply) -> float | None:
-    """Return US dollars of a reply; None if price or numbers of tokens are unknown, or if the
-    prompt is longer than the price holds for.
-    """
+    """Return a reply's cost [US dollars]; None if its tokens or their price are unknown."""
     if tariff is None or is_free(tariff):
         return None if tariff is None else 0.0
     usage = reply.usage
@@ -96,9 +93,7 @@ def cost_usd(tariff: Tariff | None, reply: Reply) -> float | None:
 
 
 def is_billed(config: ModelConfig) -> bool:
-    """True if calls may be billed: not at a price of 0, nor by a local server without a known
-    price and without a key.
-    """
+    """True if calls may be billed: not at price 0, nor by local servers without price and key."""
     tariff = tariff_of(config)
     if tariff is None:
         return config.provider not in KEYLESS or api_key_status(config).key is not None
@@ -117,9 +112,7 @@ def map_entries() -> dict[str, dict[str, Any]]:
 
 
 def map_entry(config: ModelConfig) -> dict[str, Any]:
-    """Return the entry of a model in litellm's map, by full id, or by bare name if the provider is
-    the same; empty if there is none.
-    """
+    """Return a model's entry in litellm's map, by id or the provider's bare name; maybe empty."""
     entries = map_entries()
     if config.id in entries:
         return entries[config.id]
@@ -205,8 +198,7 @@ class ModelBudget:
         return most_usd(self.tariff, prompt, longest, batched=batched)
 
     async def reserve(self, expected: Estimate, *, batched: bool = False) -> Reservation | None:
-        """Reserve the most that a call can cost, waiting for calls in progress to settle if needed;
-        None without a price.
+        """Reserve the most that a call can cost when there is room; None without a price.
 
         It is computed again whenever a call has settled, since more is known of the model then.
         Calls of a batch do not wait for the first ones. Raises BudgetReachedError if it exceeds the
@@ -340,10 +332,7 @@ def _picture_rules() -> list[tuple[re.Pattern[str], dict[str, Any]]]:
 
 
 def picture_tokens(model_id: str, image: Image, detail: ImageDetail | None = None) -> int:
-    """Return the tokens of a picture at a detail, or at the provider's default.
-
-    `model_id` may name any provider that serves the model.
-    """
+    """Return the tokens of a picture at a detail, or the provider's default, for a model id."""
     name = model_id.rpartition("/")[2].lower()
     entry = next(entry for names, entry in _picture_rules() if names.search(name))
     rule = entry.get("details", {}).get(detail or "auto", entry["usual"])

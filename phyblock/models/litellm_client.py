@@ -57,8 +57,7 @@ _OWN_CLIENTS = (
     "oobabooga", "petals", "predibase", "replicate",
 )  # fmt: skip
 """Providers whose code in litellm sends with its own HTTP client. They can be used, but litellm
-then decides about redirects, sizes and repeated requests.
-"""
+then decides about redirects, sizes and repeated requests."""
 
 
 @dataclass

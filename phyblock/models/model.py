@@ -70,12 +70,11 @@ Report = Callable[[ModelEvent], None]
 class RetryPolicy:
     """Limits on how often and how long a request is sent again.
 
-    A request is given up only when it has failed `attempts` times and `retry_for_s` have passed
-    since its first failure. An answer with HTTP 2xx and an unreadable body was paid for, so only
-    the number of attempts applies.
+    A request is given up when it has failed `attempts` times and `retry_for_s` have passed since
+    the first. An unreadable answer with HTTP 2xx was paid for, so only `attempts` apply to it.
 
-    The wait before attempt n + 1 is uniform between 0 and min(`max_wait_s`, `base_s` * 2^(n-1)),
-    on top of the server's `Retry-After` (followed up to `max_retry_after_s`).
+    The wait before attempt n + 1 is uniform between 0 and min(`max_wait_s`, `base_s` * 2^(n-1)), on
+    top of the server's `Retry-After` (followed up to `max_retry_after_s`).
     """
 
     attempts: int = 8
@@ -90,9 +89,7 @@ class RetryPolicy:
         return min(getattr(error, "retry_after_s", None) or 0.0, self.max_retry_after_s)
 
     def retrying(self, model: str, report: Report) -> AsyncRetrying:
-        """Return tenacity's loop for one request, which continues only after a RetryableError; an
-        event of the model is reported before each wait.
-        """
+        """Return tenacity's loop for a request that repeats RetryableErrors and reports waits."""
         failed_s: list[float] = []
 
         def error_of(state: RetryCallState) -> RetryableError:
@@ -234,9 +231,8 @@ class Servers:
 class Limits:
     """The limits of one model: requests in progress, and requests and tokens per minute.
 
-    Both rates are kept in the same way: a request that starts delays the next one by its share of a
-    minute. So starts are evenly spaced, and a request of more than a minute's tokens is sent, too.
-    `overall` is shared by all models of a run.
+    Each rate delays the next start by a request's share of a minute, so starts are evenly spaced,
+    and one of more than a minute's tokens is sent, too. `overall` is shared by all models of a run.
     """
 
     def __init__(self, config: ModelConfig, overall: asyncio.Semaphore, servers: Servers) -> None:
@@ -253,9 +249,8 @@ class Limits:
     async def slot(self, tokens: int = 0, failed: Server | None = None) -> AsyncIterator[Server]:
         """Hold a place of the model and of the whole run, at a chosen server.
 
-        Requests are admitted one after another; a model that waits for its turn holds no place that
-        another model could use. `tokens` is the maximum that the request can use; the server that
-        just `failed` it is the last choice.
+        Requests are admitted one by one; a waiting model holds no place that others could use.
+        `tokens` are the most of the request; a server that just `failed` it is the last choice.
         """
         async with self._under_way:
             async with self._admission:
@@ -318,8 +313,7 @@ class ChatModel:
     async def ask(self, request: Request) -> Reply:
         """Return the cached reply, or a new one, which is then cached if it is complete.
 
-        `cost_usd` of a cached reply is what it would cost today. It raises and is cancelled as
-        described in `Model.ask`.
+        A cached reply's `cost_usd` is today's. It raises and is cancelled as `Model.ask` says.
         """
         key = reply_key(self.config, request)
         if self.journal is not None and (answered := self.journal.kept(key)) is not None:

@@ -25,10 +25,7 @@ _FREE = {"cost_usd": 0.0, "attempts": 0, "cached": False}
 
 @dataclass(frozen=True)
 class LocalModel:
-    """A model that answers without a network and for free: recorded replies, or a rule.
-
-    It uses no prompt and no picture, so none is made for it.
-    """
+    """A local, free model: recorded replies, or a rule. It needs neither prompts nor pictures."""
 
     name: str
     answer: Callable[[Request], Reply | None]
@@ -87,8 +84,7 @@ def open_replay(config: ModelConfig) -> LocalModel:
 def open_baseline(config: ModelConfig) -> LocalModel:
     """Return the baseline of a configuration. Raises SpecError if there is none.
 
-    Its random numbers depend only on its name, the seed and the request's key, not on the order of
-    requests.
+    Its random numbers depend only on its name, the seed and the request's key, not on order.
     """
     name = config.name
     if name not in baseline_names():

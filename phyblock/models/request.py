@@ -44,10 +44,9 @@ class Image:
 
     @functools.cached_property
     def data_uri(self) -> str:
-        """The picture as a `data:` URI, with the type from its bytes, since providers refuse a
-        wrong type. It is cached, since one picture is sent to several models.
+        """The picture as a `data:` URI, its type taken from its bytes: providers refuse wrong ones.
 
-        Raises DataError if the picture is not PNG, JPEG, GIF or WebP.
+        It is cached for several models. Raises DataError unless it is PNG, JPEG, GIF or WebP.
         """
         mime = next((name for magic, name in _MAGIC if self.data.startswith(magic)), "")
         if not mime:
