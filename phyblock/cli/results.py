@@ -1,7 +1,4 @@
-"""The commands that read finished runs: report, show, compare, figures, bundle, verify and site.
-
-Each imports what it needs when it is called.
-"""
+"""The commands that read finished runs; each imports what it needs when it is called."""
 
 from __future__ import annotations
 
@@ -48,8 +45,7 @@ _FAILURES = 4
 def report(run: Path, prints: bool, names: tuple[str, ...], form: str, data: Path | None) -> None:
     """Write tables and report.html of the folder RUN again, or print its tables.
 
-    Uses only the files of the run: no model, no network. Draws scenes if the data set is
-    available.
+    Uses only the files of the run: no model, no network. Draws scenes if their data are there.
     """
     console = make_console()
     if not (prints or names or form != "text"):
@@ -78,10 +74,7 @@ def _check_names(run: Path, names: Sequence[str], known: Iterable[str], noun: st
 
 
 def show_tables(folder: Path, data: Path | None = None, *, page: bool = True) -> Path:
-    """Write the tables and the page of a run folder, and print the summary.
-
-    Returns the path of the page, or of the folder of tables without a page.
-    """
+    """Write a run's tables and page, and print the summary; return the path of page or tables."""
     from phyblock.results.tables import summary_of, write_tables
 
     written = write_tables(folder)

@@ -291,13 +291,11 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
         max_failures: int | None = None,
         render_mode: str | None = None,
     ) -> None:
-        """Play `data`, a data set (a folder, an official checkout, a bundled name) or tasks: scenes
-        of `levels` (None: all), or one `scene`. With `action="pose"` a block is put at the position
-        of the action, in its candidate's orientation; `setting` and `gating` are for
-        `action="block"`.
+        """Play `data`, a data set (folder, official checkout, bundled name) or tasks: scenes of
+        `levels` (None: all), or one `scene`. With `action="pose"` a block is put at the action's
+        position, in its candidate's orientation; `setting` and `gating` are for `action="block"`.
 
-        Raises DataError for a missing data set or scene, ValueError for an option that is not
-        allowed, a limit below 1, or no tasks at all.
+        Raises DataError for a missing data set or scene, ValueError for a wrong option or no tasks.
         """
         for name, value, allowed in (
             ("setting", setting, SETTINGS),
@@ -386,8 +384,7 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
     def step(self, action: Any) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Try a candidate, or end the assembly.
 
-        Raises ValueError for an action outside the space, gymnasium's ResetNeeded after the end of
-        the episode.
+        Raises ValueError for an action outside the space, gymnasium's ResetNeeded after the end.
         """
         if self._is_over:
             raise gymnasium.error.ResetNeeded("the episode has ended: call reset() before step()")

@@ -130,10 +130,7 @@ def write_vlmevalkit(
 
 
 def write_lmms_eval(folder: Path, limit: int | None) -> tuple[Path, ...]:
-    """Write a task of lmms-eval for each single-turn track, for `--include_path`.
-
-    Raises StoreError if the folder cannot be written.
-    """
+    """Write tasks of single-turn tracks for lmms-eval's `--include_path`. Raises StoreError."""
     utils = f"from {__name__} import doc_to_text, doc_to_visual, process_results\n"
     texts = {"utils.py": utils}
     form = Path(__file__).with_name("lmms_eval.yaml").read_text(encoding="utf-8")

@@ -39,10 +39,7 @@ class PhyBlockObservation(Observation):
 
 
 class PhyBlockEnvironment(Environment[PhyBlockAction, PhyBlockObservation, State]):
-    """One task per episode: a single turn, or several. Rewards sum to the score.
-
-    Environments with the same `places` take tasks in turn.
-    """
+    """A task per episode; rewards sum to its score. Environments share `places` to take turns."""
 
     SUPPORTS_CONCURRENT_SESSIONS = True
 

@@ -1,8 +1,7 @@
 """A taskset for verifiers: `vf-eval phyblock --env.taskset.track full_planning`.
 
 Plans, plans with poses and questions take one turn; episodes are conversations, in which the
-simulator answers as the user. Rewards are computed from the trace alone, so that it can be scored
-again.
+simulator answers as the user. Rewards follow from the trace alone, which can be scored again.
 """
 
 from __future__ import annotations

@@ -227,9 +227,7 @@ class ModelBudget:
         return Reservation(usd)
 
     def settle(self, reservation: Reservation, usd: float | None) -> float:
-        """Replace a reservation by the real cost; None, or an invalid amount, counts the whole
-        reservation. Return the counted amount [US dollars].
-        """
+        """Settle a reservation at a cost, in full if that is None or invalid; return it [USD]."""
         self._under_way.discard(reservation)
         self._settled += 1
         counted = usd if usd is not None and math.isfinite(usd) and usd >= 0 else reservation.usd

@@ -21,10 +21,7 @@ MOVE_PROBLEMS: tuple[MoveProblem, ...] = get_args(MoveProblem)
 
 @dataclass(frozen=True)
 class ParsedMove:
-    """A candidate's number in a reply, `Done`, or a problem.
-
-    `move` may be a number that no candidate has; `rule` is None if nothing was found.
-    """
+    """A number, even of no candidate, `Done`, or a problem; without a `rule`, nothing was found."""
 
     move: int | None = None
     is_done: bool = False

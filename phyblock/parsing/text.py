@@ -93,9 +93,8 @@ MeaningT = TypeVar("MeaningT")
 class AnswerForm(Generic[MeaningT]):
     """A form of answers, in keywords of JSON schema that all providers know.
 
-    `key` holds the answer, `value` is its schema, `meaning` parses it and returns None if it is not
-    an answer. `example_value` shows the form with letters as placeholders, so that it is not an
-    answer itself.
+    `key` holds the answer, `value` is its schema, `meaning` parses it and returns None for none.
+    `example_value` shows the form with letters as placeholders, so that it is no answer itself.
     """
 
     key: str

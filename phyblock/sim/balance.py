@@ -136,8 +136,7 @@ def _borne(blocks: Sequence[Block]) -> list[tuple[_Contacts, Floats]] | None:
     """The contacts as they are, and narrower, each with forces (k, m) that bear its part of
     `certificate.LOADS`; None if there are none.
 
-    Everything between two shifts, or masses, that can be borne is borne by the mean of their
-    forces.
+    All between two shifts, or masses, that can be borne is borne by the mean of their forces.
     """
     found: list[tuple[_Contacts, Floats]] = []
     for margin_m, shifts_m in ((MARGIN_M, np.zeros((1, 2))), (0.0, SHIFTS_M)):
@@ -296,9 +295,7 @@ def _contacts(blocks: Sequence[Block], margin_m: float = 0.0) -> _Contacts:
 
 
 def _matrix(met: _Contacts, count: int, friction: float) -> Floats:
-    """Effect of a unit of force along each edge of each cone on each of so many blocks, shape
-    (6 n, k).
-    """
+    """Effect of a unit of force along each edge of each cone on so many blocks, shape (6 n, k)."""
     edges = met.edges(friction)
     wrenches = _wrenches(met.places_m[:, None], edges)
     columns = np.zeros((len(edges), edges.shape[1], count, 6))
@@ -351,9 +348,7 @@ def _on_floor(block: Block) -> tuple[Floats, ...]:
 def _between(
     one: Turned, other: Turned, way_m: tuple[float, float, float], margin_m: float
 ) -> tuple[tuple[Floats, Floats], ...]:
-    """Corners of each contact of two blocks, from the place of the first, and its normal, away
-    from the first.
-    """
+    """Corners of the contacts of two blocks from the first one's place, and normals from it."""
     met, is_wide = [], margin_m < 0
     for first, second, axes in piece_pairs(at(one), at(other, way_m)):
         # A balance must not press on a block across a gap; a fall allows for all that may touch.

@@ -64,10 +64,7 @@ _COLLAPSE_S = 3.0  # Time for fallen blocks to come to rest [s].
 
 @dataclass(frozen=True)
 class Stability:
-    """Result of a trial: orders of blocks that passed a limit, and the largest movement [m].
-
-    `agreed` is true if all settings name the same blocks.
-    """
+    """Result of a trial: orders beyond a limit, largest movement [m], and if settings agreed."""
 
     fallen: tuple[int, ...] = ()
     moved_m: float = 0.0
@@ -217,8 +214,7 @@ class Settled(NamedTuple):
 def settle(blocks: Sequence[Block], trial: Trial = DEFAULT_TRIAL) -> Settled:
     """Release blocks at their goal poses; a block falls if it does under any setting.
 
-    Each arrangement of a group is tried once, and a verdict does not depend on earlier trials. May
-    be called from any thread.
+    An arrangement is tried once; verdicts do not depend on earlier trials. For any thread.
     """
     with _ONE_AT_A_TIME:
         return _settled(tuple(blocks), trial, physics_engine())
@@ -506,8 +502,7 @@ OUTCOME_SETTINGS: tuple[Physics, ...] = (
 
 An outcome counts only if all settings agree and each block either stayed where it was or moved far.
 Time step, solver, friction and masses vary, and the floor is tilted slightly, each time to another
-side, because a block whose weight is exactly over an edge may stay on a level floor.
-"""
+side, because a block whose weight is exactly over an edge may stay on a level floor."""
 
 
 @dataclass(frozen=True)

@@ -40,9 +40,7 @@ _MOST_CHARACTERS = 160
 
 @dataclass(frozen=True)
 class Sources:
-    """Tasks by scene id, and items that are more than scenes by track and name; if there are none,
-    `lacking` is the reason.
-    """
+    """Tasks by scene id and other items by track and name; `lacking` is the reason for none."""
 
     tasks: Mapping[str, AssemblyTask] = field(default_factory=dict)
     items: Mapping[tuple[str, str], Any] = field(default_factory=dict)
@@ -50,10 +48,9 @@ class Sources:
 
 
 def open_sources(run: Run, data: Path | None) -> Sources:
-    """Return the scenes of a run, from `data` or the path in the manifest, and the other items of
-    its tracks. Without them a page shows every reply and score, but no drawings.
+    """Return a run's scenes, from `data` or the manifest's path, and the other items of its tracks.
 
-    Raises DataError if `data` is given and is not the data of the run.
+    Without them a page has no drawings. Raises DataError if `data` are not those of the run.
     """
     try:
         dataset = recorded_dataset(run.path, run.manifest, data)
@@ -180,10 +177,7 @@ def values_of(run: Run, track: str) -> TrackValues:
 
 
 def board_of(runs: Sequence[SiteRun], entries: Sequence[Entry]) -> dict[str, Any]:
-    """Return the numbers of a page, as plain values.
-
-    Raises SpecError for runs that cannot be compared.
-    """
+    """Return the numbers of a page as plain values. Raises SpecError for incomparable runs."""
     first: dict[str, int] = {}
     for number, one in enumerate(runs):
         first |= {track: number for track in one.tracks if track not in first}

@@ -23,8 +23,7 @@ INDEX = "index.html"
 _DATA = "data/"
 _CONTROLS = frozenset({"blind", "prompt", "path", "size_px"})
 """Fields of pictures and of a track's section of the suite that may differ, are shown with the run,
-or are compared by their digest.
-"""
+or are compared by their digest."""
 _FAILURES = 4
 _ABOUT = (
     "Can vision-language models build what they see? A model gets a picture of a structure and of "

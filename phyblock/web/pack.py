@@ -66,8 +66,7 @@ _INSTRUCTIVE_BLOCKS = 6
 class Pack:
     """Entries of one kind in numbered scripts, written as they fill.
 
-    `starts` holds the number of the first entry of every script. Methods raise OSError if the disk
-    fails.
+    `starts` has the first entry's number of each script. Methods raise OSError if a disk fails.
     """
 
     def __init__(self, folder: Path, kind: str, build: str) -> None:
@@ -142,12 +141,10 @@ def pack_samples(
     failures: int,
     sent: SentPictures | None = None,
 ) -> dict[str, Any]:
-    """Write the scripts of single samples and three.js; return the index of all samples and items
-    as columns, which is the script `samples`.
+    """Write the scripts of samples and three.js; return their index, columns of script `samples`.
 
-    Every sample has its newest record, with the prompt as sent if `sent` is given. The index names
-    up to `failures` samples that show how models fail. Raises OSError if the disk fails, StoreError
-    for an unreadable record.
+    Each sample has its newest record, with the prompt if `sent` is given. Up to `failures` samples
+    show how models fail. Raises OSError if the disk fails, StoreError for unreadable records.
     """
     packs = {
         kind: Pack(folder, kind, build) for kind in ("records", "scenes", "questions", "prompts")
@@ -346,10 +343,7 @@ class SentPictures:
         return {digest_of_file(path): path for path in paths}
 
     def name(self, digest: str) -> str | None:
-        """Return the address of a picture from the page, or None if it is not kept.
-
-        Raises OSError if the disk fails.
-        """
+        """Return a picture's address, or None if it is not kept. Raises OSError if a disk fails."""
         name = f"{digest[:_DIGITS]}.png"
         path = self._folder / name
         if not path.exists() and not (self._earlier / name).exists():

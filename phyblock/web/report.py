@@ -31,11 +31,10 @@ _FAILURES = 6
 def write_report(written: TablesWritten, data: Path | None = None) -> Path:
     """Write `report.html` and `report/` of a run whose tables were written; return the page.
 
-    The page draws goals, candidates and assemblies from the scenes: `data` is the new place of the
-    data set, if it has moved; if it cannot be read, the page says so and shows the rest. Sent
-    pictures are put beside the page if the picture cache has them. Raises DataError for `data`
-    other than the run's, StoreError if the folder cannot be written or a file of others would be
-    overwritten.
+    The page draws goals, candidates and assemblies from the scenes: `data` is the data set's new
+    place, if it has moved; if it cannot be read, the page says so and shows the rest. Sent pictures
+    are put beside the page if the picture cache has them. Raises DataError for `data` other than
+    the run's, StoreError if the folder cannot be written or holds a file of others.
     """
     run = written.run
     one = SiteRun(str(run.path), run, open_sources(run, data))

@@ -1,5 +1,4 @@
-"""A human baseline: a person answers a suite on a page, with the pictures, prompts, records and
-scores of a model.
+"""A human baseline: a person answers a suite on a page, asked, recorded and scored like a model.
 
 The run asks in its event loop and waits; the server's threads read the current question, and accept
 an answer. The run shows no question before the last answer is on disk.
@@ -70,8 +69,7 @@ class Person:
 def plan_session(suite: Suite, person: Person, limit: int | None) -> RunPlan:
     """Return the plan of one person's run: a suite asked once, with its first seed.
 
-    Raises SpecError for a suite with `vary` or tracks that nobody can answer by hand, and the
-    errors of `make_plan`.
+    Raises as `make_plan`, and SpecError for `vary` or tracks that nobody can answer by hand.
     """
     if suite.vary.factors:
         message, hint = "varies its presentation, and a person is asked once", "remove `vary`"
@@ -248,10 +246,7 @@ class PlaySession:
     async def ask(
         self, request: Request, picking: Picking, *, is_warm_up: bool = False
     ) -> tuple[str, float]:
-        """Return the reply from the person's picks, and how long they took [s].
-
-        Raises HaltedError if the session is closed first.
-        """
+        """Return a person's reply and how long it took [s]. Raises HaltedError at the end."""
         answer: Future[tuple[str, float]] = Future()
         # From now on it can be settled, even if nobody waits any more.
         answer.set_running_or_notify_cancel()
@@ -356,10 +351,9 @@ class PlaySession:
 
 
 class Ending:
-    """The page after the end: for each track the means of the person, the rules and the models of
-    this run and those `beside` it, and a row for each item.
+    """The page after the end: a track's means of person, rules and models, and a row for each item.
 
-    A note explains why a run cannot be compared. Pictures are drawn on request.
+    Models are of this run and those `beside` it. A note explains why a run cannot be compared.
     """
 
     def __init__(
