@@ -2,19 +2,20 @@ from collections import Counter
 from dataclasses import replace
 from itertools import islice
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.domain.blocks import KIT_PALETTE
-from phyblock.domain.scene import MAX_CANDIDATES, Block, Candidate, Plan, Scene
+from phyblock.domain.scene import MAX_CANDIDATES, Candidate, Plan, Scene
 from phyblock.errors import DataError
 from phyblock.making.scenes.candidates import NEEDED, make_candidates
 from phyblock.making.scenes.production import Request, draw, shares
 from phyblock.making.scenes.sketch import POSES
 from phyblock.tracks.full_planning import goal_blind_plans
 from phyblock.types import SETTINGS
-from tests.scoring.cases import plans_f1
+from tests.scoring.cases import block, plans_f1
 from tests.shipped import TASKS
 
 EVERY_LOOK = [(kind, euler) for kind in KIT_PALETTE for euler in POSES[kind[0]].values()]
@@ -25,45 +26,23 @@ DEVIATIONS = 4.0
 
 
 def scene_of(looks):
-    blocks = tuple(
-        Block(i, block_type, color, (0.0, 0.0, 0.0), euler, (), 1)
-        for i, ((block_type, color), euler) in enumerate(looks, 1)
-    )
+    blocks = tuple(block(i, (*kind, euler)) for i, (kind, euler) in enumerate(looks, 1))
     return Scene("drawn", (4,), blocks, ("drawn",))
-
-
-scenes = st.lists(st.sampled_from(EVERY_LOOK), min_size=1, max_size=16).map(scene_of)
 
 
 BUILT_IN = [(task.scene, task.candidates) for task in TASKS]
 
 
-def fresh(count, seed):
-    """Base scenes of the grammar from another seed, in the shares of the built-in set."""
-    tasks = []
-    for share in shares(count):
-        goals = (draw(Request(seed, "kit", share.group, n)) for n in range(9 * count))
-        for n, goal in enumerate(islice(filter(None, goals), share.base + share.varied)):
-            name = f"{share.group}-{n}"
-            scene = replace(goal, id=name, parents=(name,))
-            tasks.append((scene, make_candidates(scene, seed)))
-    return tasks
-
-
-@given(scenes, st.integers(0, 9))
-def test_all_that_is_needed_is_there_and_no_look_twice(scene, seed):
-    candidates = make_candidates(scene, seed)
-    assert candidates.missing(scene) == ()
-    assert len(candidates) == MAX_CANDIDATES
-    assert len({candidate.look for candidate in candidates.candidates}) == len(candidates)
-
-
-@given(scenes)
-def test_distractors_are_of_the_palette_in_poses_that_goals_need(scene):
-    needed = {block.look for block in scene.blocks}
+@given(
+    st.lists(st.sampled_from(EVERY_LOOK), min_size=1, max_size=16).map(scene_of), st.integers(0, 9)
+)
+def test_all_that_is_needed_is_there_once_and_the_rest_is_in_poses_that_goals_need(scene, seed):
+    offered = make_candidates(scene, seed)
+    looks = {candidate.look for candidate in offered.candidates}
+    assert (offered.missing(scene), len(offered), len(looks)) == ((), *[MAX_CANDIDATES] * 2)
     poses = [(kind, POSES[kind[0]][pose]) for kind in KIT_PALETTE for pose in NEEDED[kind[0]]]
     known = {Candidate(*kind, euler).look for kind, euler in poses}
-    assert {one.look for one in make_candidates(scene).candidates} <= needed | known
+    assert looks <= {block.look for block in scene.blocks} | known
 
 
 def test_too_many_different_blocks_are_refused():
@@ -73,29 +52,28 @@ def test_too_many_different_blocks_are_refused():
 
 def test_distractors_are_drawn_as_goals_of_the_grammar_need_them():
     """The table of needs holds for the built-in goals, within chance and what seeds differ by."""
-    goals = [scene for scene, _ in BUILT_IN]
     pose = {
         Candidate(kind, color, euler).look: (kind, name)
         for kind, color in KIT_PALETTE
         for name, euler in reversed(POSES[kind].items())
     }
-    found = Counter(pose[look] for goal in goals for look in {b.look for b in goal.blocks})
+    found = Counter(pose[look] for goal, _ in BUILT_IN for look in {b.look for b in goal.blocks})
     for kind, needs in NEEDED.items():
         for name in POSES[kind]:
-            rate = found[kind, name] / len(goals)
+            rate = found[kind, name] / len(BUILT_IN)
             assert abs(rate - needs.get(name, 0.0)) < 0.1, (kind, name)
 
 
 def test_no_place_tells_what_is_needed():
-    needed = [
-        [one.look in {b.look for b in scene.blocks} for one in offered.candidates]
-        for scene, offered in BUILT_IN
-    ]
-    whole = [row for row in needed if len(row) == MAX_CANDIDATES]
-    chance = sum(map(sum, whole)) / (len(whole) * MAX_CANDIDATES)
-    spread = (chance * (1 - chance) / len(whole)) ** 0.5
-    for place in zip(*whole, strict=True):
-        assert abs(sum(place) / len(whole) - chance) < DEVIATIONS * spread
+    needed = np.array(
+        [
+            [one.look in {b.look for b in scene.blocks} for one in offered.candidates]
+            for scene, offered in BUILT_IN
+        ]
+    )
+    chance = needed.mean()
+    spread = (chance * (1 - chance) / len(needed)) ** 0.5
+    assert np.abs(needed.mean(axis=0) - chance).max() < DEVIATIONS * spread
 
 
 def gain(tasks, setting, repeats):
@@ -118,6 +96,13 @@ def test_no_learner_wins_by_the_candidates_of_the_built_in_set(setting, repeats)
 @pytest.mark.slow
 @pytest.mark.parametrize("setting", SETTINGS)
 def test_nor_by_those_of_a_fresh_set(setting):
-    tasks = fresh(400, 8)
+    """Base scenes of the grammar from another seed, in the shares of the built-in set."""
+    tasks = []
+    for share in shares(400):
+        goals = (draw(Request(8, "kit", share.group, n)) for n in range(9 * 400))
+        for n, goal in enumerate(islice(filter(None, goals), share.base + share.varied)):
+            name = f"{share.group}-{n}"
+            scene = replace(goal, id=name, parents=(name,))
+            tasks.append((scene, make_candidates(scene, 8)))
     assert gain(tasks, setting, repeats=False) <= GAIN
     assert gain(tasks, setting, repeats=True) <= GAIN

@@ -1,5 +1,6 @@
 """Rules by which questions are drafted and answers derived: names, lengths, places, ranks."""
 
+import contextlib
 import itertools
 from collections import Counter
 from dataclasses import replace
@@ -11,16 +12,9 @@ from hypothesis import strategies as st
 
 from phyblock.domain.blocks import COLORS, SHAPES
 from phyblock.domain.question import LETTERS, Mark, QuestionPicture
-from phyblock.domain.scene import SYMMETRIES, Block, Scene
-from phyblock.making.questions import dynamics
-from phyblock.making.questions.base import (
-    BALANCE,
-    WORDINGS,
-    Draft,
-    UnfairError,
-    four_alike,
-    ranks_among,
-)
+from phyblock.domain.scene import SYMMETRIES, Scene
+from phyblock.making.questions import base, dynamics
+from phyblock.making.questions.base import Draft, UnfairError, four_alike
 from phyblock.making.questions.guesses import keeping_odds
 from phyblock.making.questions.production import even_letters
 from phyblock.making.questions.properties import layers_of, sure_blocks
@@ -31,24 +25,12 @@ from phyblock.sim.balance import is_balanced
 from phyblock.sim.contact import find_gaps, find_overlaps, support_graph
 from phyblock.sim.question_pictures import seen, seen_order
 from tests.shipped import TASKS
-from tests.sim.structures import block as solid
-from tests.sim.structures import tower
+from tests.sim.structures import block, tower
 
 SCENES = [task.scene for task in TASKS]
 FEATURES = ("color", "type", "layer", "side", "support")
 scenes = st.sampled_from(SCENES[::9])
 seeds = st.integers(0, 2**32 - 1)
-
-
-def block(order, place, depend=(), kind="cube", color="red", euler=(0.0, 0.0, 0.0)):
-    return Block(order, kind, color, place, euler, depend, 1 + bool(depend))
-
-
-def shown(*blocks, azimuth=45.0):
-    return QuestionPicture("scene", blocks, (azimuth, 22.0))
-
-
-# Names of blocks
 
 
 @given(
@@ -81,17 +63,15 @@ def test_a_name_fits_its_block_alone_and_speaks_of_what_it_may(scene, features, 
     ],
 )
 def test_words_for_places_fit_one_block_or_none(text, place, azimuth, orders):
-    other = block(2, place, (1,) if place[2] > 0.05 else (), color="blue")
-    assert resolve(text, shown(block(1, (0, 0, 0.025)), other, azimuth=azimuth)) == orders
-
-
-# Turns, lengths, layers
+    other = block(2, "cube", place, color="blue", depend=(1,) if place[2] > 0.05 else ())
+    picture = QuestionPicture("scene", (*tower(1), other), (azimuth, 22.0))
+    assert resolve(text, picture) == orders
 
 
 @given(st.sampled_from([name for name, shape in SHAPES.items() if shape.is_long]), st.data())
 def test_a_turn_is_the_one_that_was_made(kind, data):
     euler = data.draw(st.sampled_from(sorted(POSES[kind].values())))
-    lying = block(1, (0, 0, 0.1), kind=kind, euler=euler)
+    lying = block(1, kind, (0, 0, 0.1), euler)
     try:
         turned = [replace(lying, euler_deg=euler) for _, euler in images("rr-axis", lying)]
     except UnfairError:
@@ -114,22 +94,19 @@ def test_a_loose_block_stands_free_on_the_ground(scene, seed):
 @settings(max_examples=40)
 @given(scenes)
 def test_layers_are_one_more_than_what_is_below(scene):
-    try:
-        layers = layers_of(scene.blocks)
-    except UnfairError:
-        return
     below = support_graph(scene.blocks)
-    for order, layer in layers.items():
-        assert layer == 1 + max(layers.get(other, 0) for other in below[order])
+    with contextlib.suppress(UnfairError):
+        layers = layers_of(scene.blocks)
+        for order, layer in layers.items():
+            assert layer == 1 + max(layers.get(other, 0) for other in below[order])
 
 
 @settings(max_examples=40)
 @given(scenes, st.sampled_from(SYMMETRIES), st.sampled_from(sorted(LENGTHS)))
 def test_lengths_stay_what_they_are_in_a_mirror_and_after_a_turn(scene, symmetry, rule):
     other = transformed(scene.blocks, symmetry)
-    for (a, x), (b, y) in itertools.islice(
-        itertools.permutations(zip(scene.blocks, other, strict=True), 2), 20
-    ):
+    pairs = itertools.permutations(zip(scene.blocks, other, strict=True), 2)
+    for (a, x), (b, y) in itertools.islice(pairs, 20):
         try:
             length = LENGTHS[rule](a, b, scene.blocks)
         except UnfairError:
@@ -138,14 +115,11 @@ def test_lengths_stay_what_they_are_in_a_mirror_and_after_a_turn(scene, symmetry
 
 
 def test_a_hidden_block_is_sure_where_one_that_shows_rests_on_it_alone():
-    wall = [block(i, (0.06, y, 0.025)) for i, y in enumerate((-0.05, 0.0, 0.05), 1)]
-    low, high = block(5, (0, 0, 0.025)), block(6, (0, 0, 0.075), (5,))
+    wall = [block(i, "cube", (0.06, y, 0.025)) for i, y in enumerate((-0.05, 0.0, 0.05), 1)]
+    low, high = block(5, "cube", (0, 0, 0.025)), block(6, "cube", (0, 0, 0.075), depend=(5,))
     assert sure_blocks(QuestionPicture("scene", (*wall, low, high), (0.0, 18.0))) == 5
     with pytest.raises(UnfairError, match="nothing that can be seen rests on block 5"):
         sure_blocks(QuestionPicture("scene", (*wall, low), (0.0, 18.0)))
-
-
-# Structures, places, viewpoints
 
 
 def benches(rng, has_pillar):
@@ -158,12 +132,11 @@ def benches(rng, has_pillar):
 
 @pytest.mark.parametrize("has_pillar", [False, True])
 def test_a_bench_leaves_the_scene_as_it_is_and_its_lever_says_what_stays(has_pillar):
-    """Nothing overlaps or floats; statics mostly say what a lever does, but for other tops.
-
-    What rests on a block that goes is not always what falls.
+    """Nothing overlaps or floats; statics mostly say what a lever does, but for other tops. What
+    rests on a block that goes is not always what falls.
     """
     rng = np.random.default_rng(3)
-    said, broken = Counter[tuple[bool, bool]](), 0
+    said, broken = Counter(), 0
     for on in itertools.islice(benches(rng, has_pillar), 12):
         near, far = on.limits_m
         for plan in on.plans_m(20, rng):
@@ -174,12 +147,10 @@ def test_a_bench_leaves_the_scene_as_it_is_and_its_lever_says_what_stays(has_pil
             assert blocks[: len(on.base)] == on.base
             stands = is_balanced(blocks)
             said[lean_m <= near, stands] += 1
-            if not stands:
-                continue
-            order = on.loose[-1].order
-            resting = dynamics.resting_on(blocks, order)
-            assert dynamics.resting_on(blocks, order, only=True) <= resting
-            broken += bool(resting) is dynamics.is_sure(blocks[:-1], ())
+            if stands:
+                resting = dynamics.resting_on(blocks, on.loose[-1].order)
+                assert dynamics.resting_on(blocks, on.loose[-1].order, only=True) <= resting
+                broken += bool(resting) is dynamics.is_sure(blocks[:-1], ())
     for stays in (True, False):
         assert said[stays, stays] > 4 * said[stays, not stays]
     assert broken
@@ -194,10 +165,10 @@ def test_what_lies_on_edges_when_a_block_goes_is_told_from_what_lies_on_tops(
 ):
     """A roof over a cube, beside which are two ramps, or two cubes."""
     blocks = (
-        block(1, (0.0, 0.0, 0.025)),
-        block(2, (0.0, 0.05, 0.025), kind=sides, euler=euler),
-        block(3, (0.0, -0.05, 0.025), kind=sides, euler=(euler[0], 0.0, 180.0)),
-        block(4, (0.0, 0.0, 0.05), (1, 2, 3), kind="triangle"),
+        *tower(1),
+        block(2, sides, (0.0, 0.05, 0.025), euler),
+        block(3, sides, (0.0, -0.05, 0.025), (euler[0], 0.0, 180.0)),
+        block(4, "triangle", (0.0, 0.0, 0.05), depend=(1, 2, 3)),
     )
     assert dynamics.balances_on_edges(blocks, 1, frozenset()) is is_on_edges
     assert not dynamics.balances_on_edges(blocks, 1, frozenset({4}))
@@ -205,7 +176,7 @@ def test_what_lies_on_edges_when_a_block_goes_is_told_from_what_lies_on_tops(
 
 def test_what_plainly_becomes_of_a_block_is_what_statics_say():
     """Nearly always: only what a block is set on is looked at, not what is further below."""
-    rng, said = np.random.default_rng(4), Counter[tuple[int, bool]]()
+    rng, said = np.random.default_rng(4), Counter()
     drafts = (dynamics.AffordanceMaker().drafts(scene, rng) for scene in SCENES[::40])
     for draft in itertools.islice(itertools.chain.from_iterable(drafts), 4):
         plain, (put,) = draft.pictures[0], draft.pictures[1].blocks
@@ -214,20 +185,19 @@ def test_what_plainly_becomes_of_a_block_is_what_statics_say():
         points = dynamics.points_of(plain, rng)
         outcomes = dynamics.outcomes_of(plain.blocks, put, points)
         for at, outcome in zip(points.at_m.tolist(), outcomes.tolist(), strict=True):
-            lowest = lowered(put, plain.blocks, *at[:2])
             if outcome:
+                lowest = lowered(put, plain.blocks, *at[:2])
                 group = dynamics.group_of((*plain.blocks, lowest), put.order)
-                said[outcome, is_balanced(group)] += 1
+                said[outcome, is_balanced(group) is (outcome == dynamics.STAYS)] += 1
     assert {outcome for outcome, _ in said} == {1, 2, 3}
-    for outcome, _ in said:
-        stays = outcome == dynamics.STAYS
-        assert said[outcome, stays] > 9 * said[outcome, not stays]
+    for outcome in (1, 2, 3):
+        assert said[outcome, True] > 9 * said[outcome, False]
 
 
 @pytest.mark.parametrize("rank", range(3))
 def test_of_four_next_steps_one_stays_however_far_its_plank_hangs_over(rank):
     """All lean by steps, with margins to either side of what the top bears."""
-    rng, others = np.random.default_rng(3), set[int]()
+    rng, others = np.random.default_rng(3), set()
     for on, other in zip(benches(rng, True), itertools.cycle(range(4))):
         plans = dynamics.four_plans(on, (rank, other), rng)
         if not plans:
@@ -243,26 +213,19 @@ def test_of_four_next_steps_one_stays_however_far_its_plank_hangs_over(rank):
     assert len(others) > 2
 
 
-TOP_M = 0.075
-PLANK = [*tower(1), solid(2, "cuboid3", (0, 0, 0.0625), (0, 0, 90))]
-"""15 cm long along y, balanced on a cube in its middle,"""
-WALL = solid(3, "cuboid3", (0.055, 0.05, 0.075), (0, 90, 0))
-"""beside one end, where it is in the way of a block that is put across the plank."""
-PUT = solid(4, "cuboid3", (0, 0, 0), (90, 0, 0))
-VIEW = (300.0, 35.0)
-
-
 @pytest.mark.parametrize(
-    ("place_m", "stays"),
-    [((0, 0), True), ((0, -0.068), False), ((0, 0.05), False), ((0, -0.053), None)],
+    ("y_m", "stays"), [(0, True), (-0.068, False), (0.05, False), (-0.053, None)]
 )
-def test_a_block_stays_where_the_plank_does_not_tip(place_m, stays):
-    """It falls off the wall as well; unsure is where the weights are nearly over the edge."""
-    plain = QuestionPicture("scene", (*PLANK, WALL), VIEW, marks=(Mark("A", (*place_m, TOP_M)),))
-    assert dynamics.stays_at(plain, PUT, (*place_m, TOP_M)) is stays
-
-
-# Choices: ranks of the right option, drafts that are kept, letters
+def test_a_block_stays_where_the_plank_does_not_tip(y_m, stays):
+    """A plank lies along y, balanced on a cube in its middle, beside whose one end a wall is in the
+    way; unsure is where the weights are nearly over the edge.
+    """
+    plank = block(2, "cuboid3", (0, 0, 0.0625), (0, 0, 90))
+    wall = block(3, "cuboid3", (0.055, 0.05, 0.075), (0, 90, 0))
+    put, place_m = block(4, "cuboid3", (0, 0, 0), (90, 0, 0)), (0, y_m, 0.075)
+    blocks = (*tower(1), plank, wall)
+    plain = QuestionPicture("scene", blocks, (300.0, 35.0), marks=(Mark("A", place_m),))
+    assert dynamics.stays_at(plain, put, place_m) is stays
 
 
 @given(seed=seeds)
@@ -286,7 +249,7 @@ def test_no_rank_is_more_often_right_than_another():
         measures = rng.normal(size=(14, 1))
         measures[0] += 1
         if four := four_alike(measures, unlike, 0.5, rng):
-            below = ranks_among(measures, unlike, four[0], np.array([four[1:]]))
+            below = base.ranks_among(measures, unlike, four[0], np.array([four[1:]]))
             ranks[round(float(below[0, 0]))] += 1
     assert min(ranks[rank] for rank in range(4)) > 0.15 * ranks.total()
 
@@ -297,16 +260,16 @@ def test_every_letter_is_right_about_as_often(count, seed):
     assert letters.total() == count
     for index in range(len(LETTERS)):
         # In hundredths, since 0.28 of 150 is no whole number in floating point.
-        low, high = (round(100 * share) * count for share in BALANCE)
+        low, high = (round(100 * share) * count for share in base.BALANCE)
         assert low // 100 <= letters[index] <= -(-high // 100)
 
 
-WORDINGS["told"] = "{text}"
+base.WORDINGS["told"] = "{text}"
 SHAPE_TEXTS = ("cube", "arch", "cylinder", "prism", "half cylinder")
 
 
-def told(base, text, options):
-    return Draft("told", Scene(base, (1,), (), (base,)), (), {"text": text}, options)
+def told(name, text, options):
+    return Draft("told", Scene(name, (1,), (), (name,)), (), {"text": text}, options)
 
 
 def pool(count, odds, seed):

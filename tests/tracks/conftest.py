@@ -1,5 +1,6 @@
 """Tracks opened for tests on a suite of some fields; scenes, and who draws their pictures."""
 
+import contextlib
 import json
 import tempfile
 from collections.abc import Iterator, Sequence
@@ -11,10 +12,11 @@ import pytest
 from phyblock.config.suite import load_suite
 from phyblock.data.base import Dataset
 from phyblock.data.scenes import StoredScene
-from phyblock.domain.scene import AssemblyTask, Block, Candidate, CandidateSet, Scene
+from phyblock.domain.scene import AssemblyTask, Candidate, CandidateSet, Scene
 from phyblock.tracks.base import open_tracks
 from phyblock.tracks.pictures import Workshop
 from tests.shipped import TASKS
+from tests.sim.structures import block
 from tests.workspace import Raw
 
 
@@ -46,11 +48,11 @@ def raw_of(task: AssemblyTask) -> Raw:
 def seesaw() -> AssemblyTask:
     """A bar that tips unless the second cube is there before it; nothing says so but physics."""
     blocks = (
-        Block(1, "cube", "red", (0, 0, 0.025), (0, 0, 0), (), 1),
-        Block(2, "cube", "blue", (0.11, 0, 0.025), (0, 0, 0), (), 1),
-        Block(3, "cuboid3", "yellow", (0.055, 0, 0.0625), (0, 0, 0), (1,), 2),
+        block(1, "cube", (0, 0, 0.025)),
+        block(2, "cube", (0.11, 0, 0.025), color="blue"),
+        block(3, "cuboid3", (0.055, 0, 0.0625), color="yellow", depend=(1,)),
     )
-    numbered = tuple(Candidate(b.type, b.color, b.euler_deg) for b in blocks)
+    numbered = tuple(Candidate(*one.kind, one.euler_deg) for one in blocks)
     return AssemblyTask(Scene("seesaw", (2,), blocks, ("seesaw",)), CandidateSet(numbered))
 
 
@@ -62,6 +64,5 @@ def tasks(towers: Dataset) -> tuple[AssemblyTask, ...]:
 
 @pytest.fixture(scope="session")
 def shop(pictures_dir: Path) -> Iterator[Workshop]:
-    made = Workshop(1, pictures_dir)
-    yield made
-    made.close()
+    with contextlib.closing(Workshop(1, pictures_dir)) as made:
+        yield made

@@ -86,8 +86,7 @@ def test_the_leading_measure_leads_everywhere(run, monkeypatch):
         one = (SiteRun("run", run, Sources()),)
         (track,) = board_of(one, entries_of(one))["tracks"]
         assert track["main"] == Headline(run, "counting").main.heading
-        worth = values_of(run, "counting").samples["oracle"].values()
-        assert set(worth) == {leading.best}
+        assert {*values_of(run, "counting").samples["oracle"].values()} == {leading.best}
 
 
 @pytest.mark.usefixtures("run")

@@ -9,72 +9,52 @@ from hypothesis import strategies as st
 
 from phyblock.domain.blocks import COLORS, KIT_PALETTE
 from phyblock.domain.question import LETTERS, Question
-from phyblock.domain.scene import Block, Candidate, CandidateSet, Plan, Scene
+from phyblock.domain.scene import Candidate, CandidateSet, Plan, Scene
 from phyblock.making.questions.guesses import text_rule
 from phyblock.parsing.answer import parse_answer
 from phyblock.parsing.move import parse_move
 from phyblock.parsing.plan import parse_plan, parse_poses
 from phyblock.scoring.plan import Goal
 from phyblock.sim.pictures import joined_size_px
+from phyblock.tracks import full_planning as plans
 from phyblock.tracks.base import Choice, Pick, Picking
-from phyblock.tracks.full_planning import (
-    AREA_KEYS,
-    KEYS,
-    FullPlanning,
-    PlanSubject,
-    chances,
-    color_areas,
-    goal_blind_plans,
-    related,
-    units,
-)
+from phyblock.tracks.full_planning import FullPlanning, PlanSubject, goal_blind_plans
 from phyblock.tracks.pose_planning import PosePlanning
-from phyblock.tracks.questions import (
-    FOLDS,
-    ChoiceSubject,
-    Folds,
-    Vqa,
-    guesses_of,
-    majority_rule,
-)
+from phyblock.tracks.questions import FOLDS, ChoiceSubject, Folds, Vqa, guesses_of, majority_rule
 from phyblock.tracks.step_planning import StepPlanning, StepSubject
-from tests.scoring.cases import plans_f1
+from tests.scoring.cases import block, plans_f1
 from tests.shipped import TASKS
 
 WORDS = ("cube", "arch", "cylinder", "cuboid", "cone", "prism")
 
 
-def question(number, options, answer):
-    scene = Scene(f"s{number}", (2,), (), (f"base{number % 40}",))
-    text = f"Which one is it, {WORDS[number % 6]} or not?"
-    return Question(f"sh-{number}", "SH", scene, text, options, answer)
-
-
 def made_by(rule, n=200):
-    rng = np.random.default_rng(3)
-    rows = [rule(rng) for _ in range(n)]
-    return [question(i, tuple(options), (right,)) for i, (options, right) in enumerate(rows)]
+    """Questions of which a rule gives the options, the right one first."""
+    rng, made = np.random.default_rng(3), []
+    for number in range(n):
+        options, order = rule(rng), rng.permutation(4).tolist()
+        scene = Scene(f"s{number}", (2,), (), (f"base{number % 40}",))
+        text = f"Which one is it, {WORDS[number % 6]} or not?"
+        shown = tuple(str(options[place]) for place in order)
+        made.append(Question(f"sh-{number}", "SH", scene, text, shown, (order.index(0),)))
+    return made
 
 
 def fair(rng):
-    return [str(word) for word in rng.permutation(WORDS)[:4]], int(rng.integers(4))
+    return rng.permutation(WORDS)[:4]
 
 
 def cube_is_right(rng):
-    options = ["cube", *[str(word) for word in rng.permutation(WORDS) if word != "cube"][:3]]
-    order = rng.permutation(4)
-    return [options[int(place)] for place in order], list(order).index(0)
+    return ["cube", *rng.permutation(WORDS[1:])[:3]]
 
 
 def largest_is_right(rng):
-    numbers = rng.integers(0, 100_000, 4)
-    return [f"{number} cm" for number in numbers], int(numbers.argmax())
+    return [f"{number} cm" for number in sorted(rng.integers(0, 100_000, 4))[::-1]]
 
 
 def most_alike_is_right(rng):
-    a, b, c, d, e, f = (str(one) for one in rng.permutation(WORDS))
-    options, order = [f"{a} {b}", f"{a} {c}", f"{d} {b}", f"{e} {f}"], rng.permutation(4)
-    return [options[int(place)] for place in order], list(order).index(0)
+    a, b, c, d, e, f = rng.permutation(WORDS)
+    return [f"{a} {b}", f"{a} {c}", f"{d} {b}", f"{e} {f}"]
 
 
 @pytest.mark.parametrize(
@@ -87,27 +67,23 @@ def most_alike_is_right(rng):
     ],
 )
 def test_a_tell_is_found_by_the_rule_that_can_see_it(learn, rule, least, most):
-    """Frequencies of words tell less than their numbers and likeness, and nothing where all is
-    fair.
-    """
     questions = made_by(rule)
     guesses = guesses_of(questions, learn)
     assert least <= sum(guesses(one) == one.answer for one in questions) / len(questions) <= most
 
 
 def test_what_is_learned_from_shares_no_base_scene_with_what_is_answered():
-    plain = made_by(fair, 120)
     found = [
         replace(one, scene=replace(one.scene, parents=(f"base{n % 40}", f"base{n * 7 % 40}")))
-        for n, one in enumerate(plain)
+        for n, one in enumerate(made_by(fair, 120))
     ]
     folds = Folds(found)
     for fold in range(FOLDS):
-        held_out = {base for q in found if folds.of(q) == fold for base in q.scene.parents[:1]}
-        known = [question for question in found if folds.is_known(fold, question)]
+        held_out = {one.scene.parents[0] for one in found if folds.of(one) == fold}
+        known = {base for q in found if folds.is_known(fold, q) for base in q.scene.parents}
         assert held_out
         assert known
-        assert all(held_out.isdisjoint(question.scene.parents) for question in known)
+        assert not held_out & known
 
 
 KIT = tuple(Candidate(*kind, (0.0, 0.0, 0.0)) for kind in KIT_PALETTE)
@@ -115,11 +91,8 @@ KIT = tuple(Candidate(*kind, (0.0, 0.0, 0.0)) for kind in KIT_PALETTE)
 
 def scene(name, needed, parents=()):
     """Blocks beside one another: any order is right."""
-    blocks = tuple(
-        Block(order, one.type, one.color, (0.0, 0.0, 0.0), one.euler_deg, (), 1)
-        for order, one in enumerate(needed, 1)
-    )
-    return Scene(name, (2,), blocks, parents or (name,))
+    blocks = (block(order, (*one.kind, one.euler_deg)) for order, one in enumerate(needed, 1))
+    return Scene(name, (2,), tuple(blocks), parents or (name,))
 
 
 @st.composite
@@ -141,11 +114,11 @@ def drawn_sets(draw):
 @settings(max_examples=25)
 def test_a_plan_names_candidates_of_its_set(drawn, setting, repeats):
     scenes, sets = drawn
-    plans = goal_blind_plans(scenes, sets, setting, repeats=repeats)
-    assert set(plans) == set(sets)
-    for name, plan in plans.items():
+    guessed = goal_blind_plans(scenes, sets, setting, repeats=repeats)
+    assert set(guessed) == set(sets)
+    for name, plan in guessed.items():
         assert plan.steps
-        assert all(1 <= step <= len(sets[name]) for step in plan.steps)
+        assert {*plan.steps} <= {*range(1, 1 + len(sets[name]))}
         assert repeats or len(set(plan.steps)) == len(plan)
 
 
@@ -158,12 +131,12 @@ def test_no_goal_has_a_part_in_what_is_learned_for_its_own_base_scene(drawn, set
     own = sets[scenes[at].id].candidates
     others = tuple(data.draw(st.lists(st.sampled_from(own), min_size=1, max_size=5)))
     changed = [*scenes[:at], scene(scenes[at].id, others, scenes[at].parents), *scenes[at + 1 :]]
-    kin = related(scenes)
+    kin = plans.related(scenes)
     areas = {color: data.draw(st.sampled_from([0.0, 0.15, 0.5])) for color in COLORS}
-    offered = [units(sets[one.id], setting, areas) for one in scenes]
+    offered = [plans.units(sets[one.id], setting, areas) for one in scenes]
     goals = [[Goal(one, sets[one.id], setting) for one in known] for known in (scenes, changed)]
-    for key in (*KEYS, *AREA_KEYS):
-        before, after = (chances(offered, known, kin, key) for known in goals)
+    for key in (*plans.KEYS, *plans.AREA_KEYS):
+        before, after = (plans.chances(offered, known, kin, key) for known in goals)
         for place in kin[at]:
             np.testing.assert_array_equal(before[place], after[place])
 
@@ -180,24 +153,20 @@ def test_a_planted_tell_is_found(setting, is_drawn):
         needed = [one for one in offered if one.color == color] or offered[:1]
         scenes.append(scene(f"s{number}", tuple(needed)))
         sets[f"s{number}"] = CandidateSet(tuple(offered))
-    areas = {one.id: color_areas(one, "oblique") for one in scenes}
+    areas = {one.id: plans.color_areas(one, "oblique") for one in scenes}
     assert all(areas[one.id] == {one.blocks[0].color: 1.0} for one in scenes)
     every = {name: Plan(tuple(range(1, 9))) for name in sets}
     evenly = goal_blind_plans(scenes, sets, setting, [lambda _: None])
     learned = goal_blind_plans(scenes, sets, setting)
-    seen = goal_blind_plans(scenes, sets, setting, AREA_KEYS, areas=areas)
-    found = {True: seen, False: learned}[is_drawn]
-    others = [every, evenly, learned] if is_drawn else [every, evenly]
-    assert plans_f1(scenes, sets, found, setting) > 0.8
-    assert all(plans_f1(scenes, sets, plans, setting) < 0.6 for plans in others)
+    seen = goal_blind_plans(scenes, sets, setting, plans.AREA_KEYS, areas=areas)
+    found = [seen, learned] if is_drawn else [learned]
+    f1, *others = (plans_f1(scenes, sets, one, setting) for one in (*found, every, evenly))
+    assert f1 > 0.8 > 0.6 > max(others)
 
 
 TASK = TASKS[0]
 N = len(TASK.candidates)
-TEXTS = ("a red cube", "place B", "Done", "the arch")
-PICTURES = tuple(f"<img{n}>" for n in range(1, 5))
-
-
+OPTIONS = (("a red cube", "place B", "Done", "the arch"), ("<img1>", "<img2>", "<img3>", "<img4>"))
 CENTIMETERS = st.integers(-100_000, 100_000).map(lambda n: n / 100)
 PLACED = st.tuples(st.integers(0, N - 1), st.tuples(CENTIMETERS, CENTIMETERS, CENTIMETERS))
 
@@ -206,18 +175,17 @@ PLACED = st.tuples(st.integers(0, N - 1), st.tuples(CENTIMETERS, CENTIMETERS, CE
 def test_plans_steps_and_places_are_read_as_they_were_picked(placed, step):
     subject, steps = PlanSubject(TASK.scene, TASK.candidates), tuple(n + 1 for n, _ in placed)
     reply = FullPlanning.by_hand(subject).reply([Pick(number) for number, _ in placed])
-    assert parse_plan(reply, N).plan.steps == steps
-    assert parse_plan(reply, N, "official").plan.steps == steps
+    for parser in ("steps", "official"):
+        assert parse_plan(reply, N, parser).plan.steps == steps
     reply = PosePlanning.by_hand(subject).reply([Pick(*one) for one in placed])
     read = parse_poses(reply, N).steps
     assert [(one.candidate - 1, one.center_cm) for one in read] == placed
-    parsed = parse_move(
-        StepPlanning.by_hand(StepSubject(TASK.scene, TASK.candidates)).reply([Pick(step)])
-    )
+    picking = StepPlanning.by_hand(StepSubject(TASK.scene, TASK.candidates))
+    parsed = parse_move(picking.reply([Pick(step)]))
     assert parsed.is_done if step == N else parsed.move == step + 1
 
 
-@given(st.permutations(range(4)), st.sampled_from([TEXTS, PICTURES]), st.booleans())
+@given(st.permutations(range(4)), st.sampled_from(OPTIONS), st.booleans())
 def test_an_answer_is_read_as_it_was_picked(order, options, is_ordering):
     subtask = "OR" if is_ordering else "SH"
     question = Question("q", subtask, TASK.scene, "Which?", options, (0,))
@@ -241,11 +209,10 @@ def test_numbers_that_are_lacking_or_not_allowed_are_refused(numbers):
 @given(st.lists(st.integers(-2, 6), max_size=5), st.booleans())
 def test_picks_that_make_no_answer_are_refused(picks, repeats):
     choices = FullPlanning.by_hand(PlanSubject(TASK.scene, TASK.candidates)).choices[:4]
-    joined = lambda picks: "-".join(str(pick.place) for pick in picks)  # noqa: E731
-    picking = Picking(choices, 1, 3, repeats, "step", joined)
-    is_right = 1 <= len(picks) <= 3 and all(0 <= pick < 4 for pick in picks)
+    picking = Picking(choices, 1, 3, repeats, "step", lambda them: [pick.place for pick in them])
+    is_right = 1 <= len(picks) <= 3 and {*picks} <= {0, 1, 2, 3}
     if is_right and (repeats or len(set(picks)) == len(picks)):
-        assert picking.reply(list(map(Pick, picks))) == "-".join(map(str, picks))
+        assert picking.reply(list(map(Pick, picks))) == picks
     else:
         with pytest.raises(ValueError, match="holds"):
             picking.reply(list(map(Pick, picks)))

@@ -1,6 +1,7 @@
 """Pictures of samples: drawn once, in the layout asked for, kept by content."""
 
 import asyncio
+import contextlib
 import io
 from dataclasses import replace
 
@@ -10,6 +11,7 @@ from PIL import Image as PillowImage
 from phyblock.config.suite import ImagesSpec
 from phyblock.domain.scene import AssemblyTask
 from phyblock.errors import DataError
+from phyblock.models.request import Image
 from phyblock.sim.pictures import candidates_png
 from phyblock.tracks.base import presented
 from phyblock.tracks.pictures import Workshop, picture_style, scene_drawings
@@ -28,11 +30,8 @@ def draw(folder, images, tasks):
         wanted = (shop.images(scene_drawings(task, images)) for task in tasks)
         return list(await asyncio.gather(*wanted))
 
-    shop = Workshop(1, folder)
-    try:
+    with contextlib.closing(Workshop(1, folder)) as shop:
         return asyncio.run(ask()), shop.rendered
-    finally:
-        shop.close()
 
 
 def keys(images, task):
@@ -49,8 +48,8 @@ def test_a_picture_is_drawn_once_however_often_and_by_whomever_it_is_asked_for(t
     first, drawn = draw(tmp_path, COMPOSITE, [*tasks, *tasks, *tasks])
     assert drawn == 2
     assert first[0] == first[2] == first[4] != first[1]
-    assert [picture.label for picture in first[0]] == ["composite"]
-    assert (first[0][0].width_px, first[0][0].height_px) == opened(first[0][0]).size
+    (one,) = first[0]
+    assert (one.label, one.width_px, one.height_px) == ("composite", *opened(one).size)
     assert draw(tmp_path, COMPOSITE, tasks) == (first[:2], 0)
     # What a power cut left of a file is not sent: it is drawn again, to the same bytes.
     for path in tmp_path.rglob("*.png"):
@@ -103,9 +102,9 @@ def composite_task(tasks, tmp_path):
 def test_the_data_sets_picture_is_sent_byte_for_byte_or_parted_in_two_halves(
     composite_task, tmp_path, order
 ):
-    (((picture,),), drawn) = draw(tmp_path / "cache", OWN, [composite_task])
-    assert picture.data == composite_task.composite.read_bytes()
-    assert (picture.label, picture.width_px, picture.height_px, drawn) == ("composite", 514, 256, 0)
+    found, drawn = draw(tmp_path / "cache", OWN, [composite_task])
+    whole = Image(composite_task.composite.read_bytes(), "composite", 514, 256)
+    assert (found, drawn) == ([(whole,)], 0)
     apart = ImagesSpec(source="dataset", layout="separate", order=order)
     ((pair,), _) = draw(tmp_path / "cache", apart, [composite_task])
     assert tuple(picture.label for picture in pair) == order

@@ -1,7 +1,6 @@
 """Pose planning: what a reply is worth in three settings, and a run of it from YAML to the page."""
 
 import asyncio
-import functools
 import shutil
 
 import numpy as np
@@ -9,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from phyblock.domain.scene import Block, Candidate, CandidateSet, PoseStep
+from phyblock.domain.scene import Candidate, CandidateSet, PoseStep
 from phyblock.errors import StoreError
 from phyblock.parsing.plan import parse_poses
 from phyblock.records.files import known_records
@@ -24,16 +23,16 @@ from phyblock.tracks import pose_planning as pose_track
 from phyblock.tracks.pose_planning import PosePlanning, written
 from phyblock.types import STEP_ENDS
 from tests.shipped import TASKS
-from tests.sim.structures import block_types, eulers
+from tests.sim.structures import block, block_types, eulers
 from tests.tracks.conftest import track_of
 from tests.workspace import call, plan_text
 
 STANDS = "Step1: block 1 at (0, 0, 2.5)\nStep2: block 3 at (0, 0, 7.5)"
 
 
-@functools.cache
-def poses():
-    """The track, judging in this process."""
+@pytest.fixture(scope="module")
+def track():
+    """It judges in this process."""
     return track_of("pose_planning", TASKS[:1])
 
 
@@ -48,27 +47,28 @@ BUILT_IN = [t for t in TASKS if t.key.startswith(("l1-001-animal", "l2-020", "l3
 
 @given(block_types, eulers, st.tuples(*[st.floats(-1, 1)] * 3))
 def test_a_block_is_put_where_its_box_is_said_to_be(name, euler_deg, place_m):
-    block = Block(1, name, "red", place_m, euler_deg, (), 1)
     kept = CandidateSet((Candidate(name, "red", euler_deg),))
-    found = put(PoseStep(1, center_cm(block)), kept)
+    found = put(PoseStep(1, center_cm(block(1, name, place_m, euler_deg))), kept)
     assert found.position_m == pytest.approx(place_m)
     assert found.euler_deg == euler_deg
     assert put(PoseStep(2, (0, 0, 0)), kept) is None
 
 
-def test_true_poses_in_a_random_valid_order_are_right_and_stand():
-    track = poses()
-    for seed, item in enumerate(BUILT_IN):
-        shown = track.shown(item, seed)
-        subject = track.subject_of(shown)
-        text = PosePlanning.baselines["oracle"](subject, np.random.default_rng(seed))
-        fields, n = track.judge(shown, text).fields, len(item.scene)
-        pose = fields["pose"]
-        assert pose["right"] == {"absolute": [n] * 4, "aligned": [n] * 4}
-        assert {(step["end"], step["error"]) for step in pose["steps"]} == {("stands", None)}
-        assert (pose["reached"], pose["completed"]) == (n, True)
-        assert pose["iou"] >= 0.98
-        assert all(score["tp"] == n for score in fields["scores"])
+def text_of(track, baseline, item, seed):
+    rule = PosePlanning.baselines[baseline]
+    return rule(track.subject_of(item), np.random.default_rng(seed))
+
+
+@pytest.mark.parametrize(("seed", "item"), [*enumerate(BUILT_IN)])
+def test_true_poses_in_a_random_valid_order_are_right_and_stand(track, seed, item):
+    shown, n = track.shown(item, seed), len(item.scene)
+    fields = track.judge(shown, text_of(track, "oracle", shown, seed)).fields
+    pose = fields["pose"]
+    assert pose["right"] == {"absolute": [n] * 4, "aligned": [n] * 4}
+    assert {(step["end"], step["error"]) for step in pose["steps"]} == {("stands", None)}
+    assert (pose["reached"], pose["completed"]) == (n, True)
+    assert pose["iou"] >= 0.98
+    assert {score["tp"] for score in fields["scores"]} == {n}
 
 
 @pytest.mark.parametrize(
@@ -91,32 +91,28 @@ def test_true_poses_in_a_random_valid_order_are_right_and_stand():
         (None, (0, 0, 0, 0), [], [], 0),
     ],
 )  # fmt: skip
-def test_a_reply_is_read_scored_and_carried_out(task, text, right, ends, errors, reached):
-    track = poses()
+def test_a_reply_is_read_scored_and_carried_out(track, task, text, right, ends, errors, reached):
     found = track.judge(task, text)
     pose = found.fields["pose"]
-    assert pose["right"]["absolute"] == list(right)
-    assert [step["end"] for step in pose["steps"]] == ends
-    assert [step["error"] for step in pose["steps"]] == errors
-    assert pose["reached"] == reached
+    assert (pose["right"]["absolute"], pose["reached"]) == (list(right), reached)
+    told = [(step["end"], step["error"]) for step in pose["steps"]]
+    assert told == list(zip(ends, errors, strict=True))
     assert found.is_read == bool(ends)
     # Its record is written, read again and judged again, and says the same.
-    fields = begun("s", track, "m", task, 0, None)
-    record = judged(track, task, {**fields, **track.about(task)}, found)
+    fields = begun("s", track, "m", task, 0, None) | track.about(task)
+    record = judged(track, task, fields, found)
     assert known_records().validate_json(record.as_json()) == record
     again = asyncio.run(track.judge_apart(task, text, record))
-    assert judged(track, task, {**fields, **track.about(task)}, again) == record
+    assert judged(track, task, fields, again) == record
 
 
 @pytest.mark.parametrize("baseline", ["oracle-noise-1cm", "stack", "oracle-2d"])
-def test_where_blocks_came_to_lie_follows_from_what_each_step_moved(baseline):
-    item, track = BUILT_IN[0], poses()
-    text = PosePlanning.baselines[baseline](track.subject_of(item), np.random.default_rng(1))
-    found = track.judge(item, text)
+def test_where_blocks_came_to_lie_follows_from_what_each_step_moved(track, baseline):
+    item = BUILT_IN[0]
+    text = text_of(track, baseline, item, 1)
+    record = judged(track, item, begun("s", track, "m", item, 0, None), track.judge(item, text))
     blocks = [put(step, item.candidates) for step in parse_poses(text, 16).steps]
-    fields, worlds = begun("s", track, "m", item, 0, None), execute(blocks).worlds
-    record = judged(track, item, fields, found)
-    for n, world in enumerate(worlds, 1):
+    for n, world in enumerate(execute(blocks).worlds, 1):
         ended = record.pose.model_copy(update={"steps": record.pose.steps[:n]})
         built = record.model_copy(update={"pose": ended}).built(item)
         for one, other in zip(world, built, strict=True):
@@ -127,13 +123,13 @@ def test_where_blocks_came_to_lie_follows_from_what_each_step_moved(baseline):
 
 @settings(max_examples=12)
 @given(st.lists(st.sampled_from([1, 1, 3, 3, 2, 17, 0]), max_size=4))
-def test_without_poses_a_plan_is_scored_as_full_planning_scores_it(task, numbers):
+def test_without_poses_a_plan_is_scored_as_full_planning_scores_it(track, task, numbers):
     """Far from one another, so that nothing falls on anything."""
     steps = [PoseStep(n, (20.0 * place, 0.0, 2.5)) for place, n in enumerate(numbers)]
     full = track_of("full_planning", TASKS[:1])
     found = full.judge(task, plan_text(*numbers) if numbers else None).fields["scores"]
     wanted = [score for score in found if score["criterion"] == "aov"]
-    assert poses().judge(task, written(steps)).fields["scores"] == wanted
+    assert track.judge(task, written(steps)).fields["scores"] == wanted
 
 
 def fit(position_cm, up_cm, turn_deg=0.0):
@@ -172,6 +168,8 @@ def test_a_run_is_scored_again_without_an_engine(inside, monkeypatch):
     rescore(again)
     with pytest.raises(StoreError, match=r"pose_planning\.execution"):
         call(*run)
-    whole, scored = ({r["sample"]: r for r in inside.records(path)} for path in (inside.out, again))
-    for name in ("parse", "scores", "pose"):
-        assert {key: r[name] for key, r in scored.items()} == {k: r[name] for k, r in whole.items()}
+    whole, scored = (
+        {r["sample"]: (r["parse"], r["scores"], r["pose"]) for r in inside.records(path)}
+        for path in (inside.out, again)
+    )
+    assert whole == scored

@@ -47,8 +47,16 @@ def test_blocks_become_messages_with_captioned_pictures_before_the_user_text(tmp
 @settings(max_examples=15)
 def test_an_edit_is_another_prompt(tmp_path_factory, first, second):
     folder = tmp_path_factory.mktemp("prompts")
-    versions = [prompt(folder, f"x{text}").version for text in (first, second)]
-    assert (versions[0] == versions[1]) == (first == second)
+    one, other = (prompt(folder, f"x{text}").version for text in (first, second))
+    assert (one == other) == (first == second)
+
+
+TOO_LONG = ("(" * 5_000 + "1" + ")" * 5_000, "1" + " + 1" * 20_000, "0x" + "f" * 10_000)
+OTHER_FILES = (
+    *("{% include 'secret.txt' %}", "{% include '/etc/hostname' ignore missing %}"),
+    *("{% import 'mine.j2' as m %}", "{% extends 'part.j2' %}{% block user %}{% endblock %}"),
+    "{% from 'secret.txt' import x %}{% block user %}a{% endblock %}",
+)
 
 
 @pytest.mark.parametrize(
@@ -63,29 +71,20 @@ def test_an_edit_is_another_prompt(tmp_path_factory, first, second):
         ("{% block sytem %}{% endblock %}{% block user %}a{% endblock %}", "mine.j2:1",
          "is a block that nothing uses"),
         ("{% block user %}a{% endblock %}\nb", "mine.j2:2", "is outside of the blocks"),
-        ("{% include 'secret.txt' %}", "mine.j2:1", "a prompt is one file"),
-        ("{% include '/etc/hostname' ignore missing %}", "mine.j2:1", "a prompt is one file"),
+        *((body, "mine.j2:1", "a prompt is one file") for body in OTHER_FILES),
         ("\n{% include n_candidates %}", "mine.j2:2", "a prompt is one file"),
-        ("{% import 'mine.j2' as m %}", "mine.j2:1", "a prompt is one file"),
-        ("{% from 'secret.txt' import x %}{% block user %}a{% endblock %}", "mine.j2:1",
-         "a prompt is one file"),
-        ("{% extends 'part.j2' %}{% block user %}{% endblock %}", "mine.j2:1",
-         "a prompt is one file"),
         ("{% macro f() %}\n{{ 1 // 0 }}{% endmacro %}{% block user %}{{ f() }}{% endblock %}",
          "mine.j2:2", "division"),
         ("{% macro f() %}{{ f() }}{% endmacro %}{% block user %}{{ f() }}{% endblock %}",
          "mine.j2:1", "nested too deeply"),
         ("x" * 300_000, "mine.j2", "cannot be read"),
-        ("{{ " + "(" * 5_000 + "1" + ")" * 5_000 + " }}", "mine.j2", "is not valid Jinja"),
-        ("{{ 1" + " + 1" * 20_000 + " }}", "mine.j2", "is not valid Jinja"),
-        ("{{ 0x" + "f" * 10_000 + " }}", "mine.j2", "is not valid Jinja"),
+        *((f"{{{{ {body} }}}}", "mine.j2", "is not valid Jinja") for body in TOO_LONG),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_said_with_file_and_line(tmp_path, body, where, said):
     (tmp_path / "secret.txt").write_text("secret", encoding="utf-8")
     problem = problem_of(PromptError, lambda: prompt(tmp_path, body).messages((), FACTS))
-    assert said in problem.message
-    assert where in problem.where
+    assert (said in problem.message, where in problem.where) == (True, True), problem
 
 
 @settings(max_examples=40)
