@@ -272,7 +272,10 @@ class Task:
         return None if form is None else form.schema
 
     def score(self, reply: str | Sequence[str] | None) -> Score:
-        """Score one reply, an episode's in order, or None. Raises SpecError for anything else."""
+        """Return the score of a reply, of an episode's replies in order, or of no reply (None).
+
+        Raises SpecError for anything else.
+        """
         if self.plays and (reply is None or isinstance(reply, Sequence)):
             episode = Episode(self, shows=False)
             for one in [reply] if isinstance(reply, str) else reply or ():
@@ -598,8 +601,9 @@ def run_suite(
     called only with `yes`, or under a limit of the suite (`limits.max_cost_usd`). Warns of models
     that were stopped, and of samples that are left, rejected or not judged.
 
-    Raises InputError for invalid input before any call. An interrupt ends sending, waits for calls
-    in progress (unless it comes twice), and raises KeyboardInterrupt once all replies are on disk.
+    Raises InputError for invalid input before any call. An interrupt stops new calls, waits for
+    those in progress (unless it comes twice), and raises KeyboardInterrupt once all replies are on
+    disk.
     """
     loaded = suite if isinstance(suite, Suite) else load_suite(suite)
     named = None if models_file is None else str(models_file)

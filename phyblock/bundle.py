@@ -204,7 +204,7 @@ def portable(record: Record) -> Record:
 
 
 def unpack(path: Path, folder: Path) -> str:
-    """Unpack a bundle; return its version of phyblock. Raises StoreError if it is broken."""
+    """Unpack a bundle; return the version that made it. Raises StoreError if it is broken."""
     try:
         with open_regular(path) as file:
             if file.seek(0, io.SEEK_END) > _LARGEST_BYTES:

@@ -288,7 +288,7 @@ class ModelConfig(Section):
     def is_direct(self) -> bool:
         """True if calls go straight to the server instead of through litellm.
 
-        With `auto`: to a server named by `api_base`, unless litellm renames the model's parameters.
+        With `auto`, this holds if `api_base` names a server, unless litellm renames parameters.
         """
         if self.transport != "auto":
             return self.transport == "direct"

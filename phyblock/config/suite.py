@@ -293,7 +293,7 @@ class Suite(Section):
     levels: UniqueSome[Level] = (1, 2, 3, 4)
     """Difficulty levels; only generated scenes have level 5."""
     limit: Count | None = None
-    """Most items per track, spread over levels or subtasks; null: all. --limit overrides it."""
+    """Maximum items per track, spread over levels or subtasks; null: all. --limit overrides it."""
     settings: UniqueSome[Setting] = ("A", "B")
     """A compares type, color and orientation, B type and color. Each reply is scored under all."""
     seeds: UniqueSome[Seed] = (0,)

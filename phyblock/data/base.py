@@ -1,7 +1,6 @@
 """Data sets, and functions that read untrusted files.
 
-All problems of a file are raised at once, as one DataError with their places. No file may hang the
-program or exhaust its memory.
+All problems of a file are one DataError with their places. No file hangs or exhausts memory.
 """
 
 from __future__ import annotations

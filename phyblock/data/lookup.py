@@ -31,7 +31,7 @@ def open_dataset(layout: str, folder: Path) -> Dataset:
 
 
 def find_questions(name: str) -> Path:
-    """Return the folder of `name`, with questions or a bundled set. Raises DataError."""
+    """Return the folder of questions of this name or path, bundled or not. Raises DataError."""
     path = Path(name)
     return path if path.is_dir() else _file_or_bundled(path, QUESTIONS_FILE, "set of questions")
 

@@ -66,8 +66,7 @@ def _task(
 ) -> InspectTask:
     """Return the task of a track; `items` is the limit of `phyblock.tasks`, spread over levels.
 
-    `-T` passes a single value as it is, and several separated by commas as texts: `1,2` is
-    ['1', '2'].
+    `-T` passes a single value as it is, several with commas as texts: `1,2` is ['1', '2'].
     """
     found = overrides if isinstance(overrides, list | tuple) else [overrides]
     if levels is not None:

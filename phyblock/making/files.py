@@ -66,7 +66,7 @@ def write_questions(
     card: str,
     pictures: Iterable[str] = (),
 ) -> None:
-    """Write questions in order; `originals` are scenes as stored, `pictures` files there."""
+    """Write questions in order; `originals` are stored scenes, `pictures` existing file names."""
     lines = (StoredQuestion.of(q, originals[q.scene.id]).as_json() for q in questions)
     texts = (card, "".join(f"{line}\n" for line in lines))
     _write(folder, QUESTION_FILES, texts, QUESTION_SET_VERSION, pictures)

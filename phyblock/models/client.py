@@ -429,8 +429,7 @@ class OpenAIClient(Client):
 def read_json(answer: Answer) -> object:
     """Return the decoded body of an answer whose status indicates a reply.
 
-    Raises a ModelError for a body that is incomplete, is not JSON within bounds, or is an error:
-    some servers send those with status 200.
+    Raises a ModelError if it is incomplete, not JSON within bounds, or an error (with status 200).
     """
     if answer.fault or not answer.is_success:
         raise error_of(answer)

@@ -396,8 +396,7 @@ def parse_poses(text: str, n_candidates: int) -> ParsedPoses:
     """Parse the plan with poses from a reply; numbers that no candidate has stay in it.
 
     It is JSON of the requested form, else the last list of step lines, items or table rows, each
-    with a block and three coordinates. It is read as a whole or not at all: a plan with a step
-    missing would be another plan.
+    with a block and coordinates. It is read whole or not at all: without a step it is another plan.
     """
     answer = answer_of(text)
     if not answer:

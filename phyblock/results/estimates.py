@@ -121,7 +121,7 @@ def track_estimates(run: Run, track: str) -> pd.DataFrame:
     own unit; `mean`, `sd` (ddof = 1), `least` and `most` are over the values of the `seeds` single
     seeds. `lo` and `hi` bound a 95 % interval and `se` is the standard error, from leaving out the
     `n_clusters` base scenes that the `n_scenes` scenes were made from; a scene's seeds stay
-    together. Values of a model without replies in a cell are NaN. Do not change the frame.
+    together. Values of a model without replies in a cell are NaN. Do not change the cached frame.
     """
     if track in run.made:
         return run.made[track]

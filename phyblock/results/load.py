@@ -51,8 +51,7 @@ _TYPES = {
     **{f"error_{name}": kind for name, kind in _OF_ERROR.items()},
     **{"rule": "object", "start": "int64"},
 }
-"""Columns of `Run.records` with their types. `start` is the offset of the record in
-`records.jsonl` [bytes]."""
+"""Columns of `Run.records` with their types; `start` is the offset in `records.jsonl` [bytes]."""
 
 
 def track_measures(track: str) -> tuple[Measure, ...]:
@@ -128,7 +127,7 @@ def _row(record: Record, start: int) -> tuple[Any, ...]:
 class Design:
     """The plan of a run from its `run.yaml`, which determines the rows and columns of tables.
 
-    `items` has each track's number. The suite's first matcher and setting are the headline's.
+    `items` has their number by track. The suite's first matcher and setting are the headline's.
     """
 
     suite: Suite

@@ -28,8 +28,7 @@ Row = Mapping[Hashable, Any]
 class Column:
     """A column; neighbors of one `group` share a heading. Numbers are aligned to the right.
 
-    `show` returns its text for a row of a frame. Columns that are shown `once` are empty if all of
-    them are the same as in the row above.
+    `show` returns its text for a row. Columns shown `once` are empty if all equal the row above.
     """
 
     name: str

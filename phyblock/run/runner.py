@@ -192,7 +192,7 @@ class Session:
         return self.result
 
     def _open(self, stack: AsyncExitStack) -> None:
-        """Open store, cache and models for the stack, queue samples, emit the run's progress."""
+        """Open store, cache and models on the stack, queue the samples, and emit the progress."""
         plan, result, limits = self.plan, self.result, self.plan.suite.limits
         stack.callback(plan.close)
         samples = {planned.name: list(plan.samples(planned)) for planned in plan.models}

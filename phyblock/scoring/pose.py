@@ -334,7 +334,10 @@ class PoseFit:
 
 @dataclass(frozen=True)
 class PoseScore:
-    """A plan in a frame: the fit of each step (None: unmatched), right ones by `TOLERANCES_CM`."""
+    """One plan in one frame.
+
+    `fits` are None for unmatched steps; `right` counts right steps at each of `TOLERANCES_CM`.
+    """
 
     frame: PoseFrame
     fits: tuple[PoseFit | None, ...]

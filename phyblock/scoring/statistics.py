@@ -80,10 +80,9 @@ class Clusters:
 class Estimate:
     """A measured value, or an array of them, with its uncertainty.
 
-    `value` is over all units, `se` its standard error, `lo` and `hi` bound the interval, `p` is
-    two-sided against zero, by Student's t with `n_clusters` - 1 degrees of freedom; `n_clusters`
-    are behind each value. All have one shape; NaN where there is no value, and in all but `value`
-    with fewer than two clusters.
+    `value` is over all units, with standard error `se` and interval `lo` to `hi`; `p` is two-sided
+    against zero, by Student's t with `n_clusters` - 1 degrees of freedom (those behind a value).
+    All have one shape; NaN without a value, and for fewer than two clusters in all but `value`.
     """
 
     value: Floats

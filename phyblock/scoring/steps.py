@@ -141,9 +141,8 @@ def placed_counts(
 ) -> Counts:
     """Counts over the blocks in the world, made of the candidates `chosen` (Table 3's layout).
 
-    The world enforces the order, so a block is a true positive when the goal has one that is equal
-    under the setting, one-to-one. The vertices `fallen` have collapsed: all candidates placed there
-    are false positives.
+    The world enforces the order, so a block is a true positive if the goal has an equal one,
+    one-to-one. The vertices `fallen` have collapsed: candidates placed there are false positives.
     """
     attribute = "look" if setting == "A" else "kind"
     standing = list(chosen)

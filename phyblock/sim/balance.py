@@ -1,10 +1,9 @@
 """Statics: proofs that blocks stand or fall, with a margin.
 
 Blocks stand when forces in their contacts can bear every weight: each force inside the cone of
-friction, all forces and moments of a block in balance. That is a set of linear equations in forces
-that only push, with each cone as a pyramid of four edges. If such forces exist, rigid bodies can
-stand; if none exist, they cannot. Least squares find them in most cases, linear programming decides
-the rest.
+friction, all forces and moments of a block in balance. Those are linear equations in forces that
+only push, with each cone as a pyramid of four edges. If such forces exist, rigid bodies can stand;
+if none exist, they cannot. Least squares find most, linear programming decides the rest.
 
 `surely_stands` and `surely_falls` require this with all weights shifted by up to `MARGIN_M` to any
 side and long blocks heavier or lighter, and everything in between, so that no verdict depends on a

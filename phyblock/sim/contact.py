@@ -158,7 +158,7 @@ def support_graph(
     """For each block's order, the orders of the blocks it rests on; 0 is the ground.
 
     B rests on A when they touch in an area, or, without `only_areas`, an edge on a face, with an
-    upward normal within 45 degrees. Edges on a border count only without other support.
+    upward normal within 45 degrees. Edges on a face's border count only without other support.
     """
     rests_on: dict[int, set[int]] = {block.order: set() for block in blocks}
     for block in blocks:

@@ -214,7 +214,7 @@ class Settled(NamedTuple):
 def settle(blocks: Sequence[Block], trial: Trial = DEFAULT_TRIAL) -> Settled:
     """Release blocks at their goal poses; a block falls if it does under any setting.
 
-    An arrangement is tried once; verdicts do not depend on earlier trials. For any thread.
+    An arrangement is tried once; verdicts do not depend on earlier ones. Safe in any thread.
     """
     with _ONE_AT_A_TIME:
         return _settled(tuple(blocks), trial, physics_engine())
@@ -342,11 +342,10 @@ def execute(
 class Executor:
     """Executes a plan with poses, step by step; a context manager.
 
-    A block that overlaps others by no more than a tolerance is moved out the shortest way, and one
-    that floats by no more is lowered; one that overlaps more is refused. It is released together
-    with only the blocks near it; others join when something that fell comes near. If a step moves
-    nothing beyond the limits of `DEFAULT_TRIAL`, all poses are restored, so that drift does not
-    affect later steps.
+    A block that overlaps others by at most a tolerance is moved out the shortest way, and one that
+    floats by no more is lowered; one that overlaps more is refused. It is released with only the
+    blocks near it; others join if something that fell comes near. If a step moves nothing beyond
+    the limits of `DEFAULT_TRIAL`, all poses are restored: drift must not affect later steps.
     """
 
     def __init__(

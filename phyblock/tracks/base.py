@@ -221,7 +221,7 @@ class Track(ABC):
     def __init__(
         self, suite: Suite, dataset: Dataset, limit: int | None = None, shop: Workshop | None = None
     ) -> None:
-        """Open at most `limit` items; makes no requests without a shop. Raises InputError."""
+        """Open on at most `limit` items; without a shop it makes no requests. Raises InputError."""
         self.suite, self.dataset, self.limit, self.shop = suite, dataset, limit, shop
         self.spec: Any = None if self.options is None else suite.section(self.options)
         self.is_blind = isinstance(self.spec, PictureControls) and self.spec.blind
@@ -387,8 +387,7 @@ class Track(ABC):
     def outlines(self, item: Any) -> Iterator[Request]:
         """Yield the requests of an item as far as they are known before any reply.
 
-        They have seed 0 and no parameters. Nothing is rendered: a picture that is not in the cache,
-        or not known yet, is empty.
+        They have seed 0 and no parameters. Pictures that are unknown or not in the cache are empty.
         """
         pictures = () if self.shop is None else self.shop.outlines(self.drawings(item))
         yield self.asked(item, 0, {}, () if self.shop is None else self.messages(item, pictures))

@@ -74,7 +74,7 @@ class Drawing:
 class Workshop:
     """Draws pictures and does other long work in processes, which start on first use.
 
-    Pictures are kept in `folder` by content, the last in memory; `rendered` counts those drawn.
+    Pictures are kept in `folder` by content, the last ones in memory; `rendered` counts new ones.
     """
 
     def __init__(self, workers: int = 0, folder: Path | None = None) -> None:

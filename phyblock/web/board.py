@@ -94,8 +94,7 @@ class TrackValues:
 @dataclass(frozen=True, eq=False)
 class SiteRun:
     """An opened run: `where` is the path that the user gave, `sources` are the data to draw from.
-    `unverified` lists what was not checked in a bundle; None for a folder, which is not scored
-    again.
+    `unverified` lists what was not checked in a bundle; None for a folder, which is not rescored.
     """
 
     where: str

@@ -328,8 +328,7 @@ def _scene(task: AssemblyTask) -> dict[str, Any]:
 class SentPictures:
     """Sent pictures, put into `folder` on request by their digests.
 
-    They come from the picture cache and the data set; nothing is rendered. Files are hard links
-    into the cache if possible, else copies.
+    They come from the cache or the data set, as hard links if possible; nothing is rendered.
     """
 
     def __init__(self, folder: Path, earlier: Path, sources: Sources) -> None:

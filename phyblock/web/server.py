@@ -64,9 +64,8 @@ class Server(ThreadingHTTPServer):
     """A server of one session until it is closed; a context manager.
 
     `address` is for a browser, with a token that nobody can guess; `one_time_address` redirects to
-    it the first time it is opened, and never again. `files` are also served, by their names below
-    the address. The page sets `finished` when the person is done. Raises SpecError for a port that
-    is taken.
+    it the first time it is opened, and never again. `files` are served too, by their names below
+    it. The page sets `finished` when the person is done. Raises SpecError for a taken port.
     """
 
     daemon_threads = True

@@ -85,8 +85,7 @@ def plan_session(suite: Suite, person: Person, limit: int | None) -> RunPlan:
 class PersonModel:
     """A model that answers a request with the reply from a person's picks on a page.
 
-    Before the first plan, the person may try the page on a scene of level 1 that is not in the run,
-    if there is one; nothing of it is kept.
+    Before the first plan, the person may try the page on another scene; nothing of it is kept.
     """
 
     needs_messages = True

@@ -105,8 +105,7 @@ def is_sure(left: Sequence[Block], moved: Collection[int]) -> bool:
 def resting_on(blocks: Sequence[Block], order: int, *, only: bool = False) -> Lot:
     """Return the orders of the blocks that rest on a block, directly or not, without its own.
 
-    With `only`, they rest on nothing else. Naive rules say that exactly these blocks, with or
-    without `only`, fall when it is removed.
+    With `only`, they rest on nothing else. By naive rules, exactly these fall when it is removed.
     """
     found: Lot = frozenset({order})
     for _ in blocks:
@@ -190,8 +189,7 @@ def _outcome_text(count: int) -> str:
 def falling(whole: Sequence[Block], order: int) -> Lot | None:
     """Return the orders of the blocks that by statics move when one is removed.
 
-    These are blocks next to it, with all that rests on them. None if that is not sure, or if
-    something would stay on edges alone.
+    They are next to it, or rest on those; None if unsure, or if some would stay on edges alone.
     """
     blocks = group_of(whole, order)
     left, below = [block for block in blocks if block.order != order], _below(blocks)
@@ -456,8 +454,7 @@ def _next_steps(scene: Scene, ranks: Ranks, rng: np.random.Generator) -> Draft |
 def four_plans(on: Bench, ranks: Ranks, rng: np.random.Generator) -> list[list[float]]:
     """Return four plans or none: only the first has its center of mass over the support, clearly.
 
-    Its `ranks` are by the overhang of the plank, and by the distance of the center of mass from the
-    middle of the structure.
+    Its `ranks` are by the plank's overhang, and how far the center of mass is from the middle.
     """
     near, far = on.limits_m
     plans = on.plans_m(_PLANS, rng)

@@ -245,7 +245,7 @@ def are_told_apart(pictures: Sequence[QuestionPicture]) -> bool:
 
 
 def marked(picture: QuestionPicture, letter: str) -> tuple[tuple[float, float, float], int]:
-    """Return a mark's place [m] and its visible block's order. Raises UnfairError without one."""
+    """Return a mark's place [m] and the block seen there, by order. Raises UnfairError if none."""
     shot = seen(replace(picture, marks=()))
     for mark in picture.marks:
         order = seen_order(picture, shot, mark.position_m)

@@ -83,8 +83,7 @@ class Completed:
 def complete(read: ReadScene) -> Completed:
     """Derive a scene, and check that it can be built and stands.
 
-    Problems are blocks that overlap, float or fall, contacts that allow no order, and candidates
-    that lack a needed look.
+    Problems are blocks that overlap, float or fall, contacts without order, and missing looks.
     """
     name, given, where = read
     try:

@@ -90,8 +90,7 @@ class Request:
 def draw(request: Request) -> Scene | None:
     """Return the scene of a request, or None if the rules gave none that fits.
 
-    Its name is its theme, or `recolored` or `combined` for a variation. Accepted scenes get their
-    own names and their parents later.
+    Its name is its theme, `recolored` or `combined`; accepted scenes get names and parents later.
     """
     if not request.parents:
         return _drawn_base(request)
