@@ -61,19 +61,19 @@ def requests_of(count):
 @contextlib.contextmanager
 def serving(route, faults=None, kind=None):
     """A server of batches, and a model there."""
-    server = (kind or SERVERS[route])(batch=faults)
-    with Running(server) as running:
-        yield server, config_at(route, running.url)
+    with Running((kind or SERVERS[route])(batch=faults)) as running:
+        yield running.server, config_at(route, running.url)
 
 
-def served(route, disk, requests, faults, **options):
+def served(route, disk, requests, faults=None, **options):
+    """A server of batches, and what a command comes to there."""
     with serving(route, faults) as (server, config):
         return server, run_command(config, disk, requests, **options)
 
 
 def texts(ended):
-    assert all(isinstance(one, Reply) for one in ended), ended
-    return [one.text for one in ended if isinstance(one, Reply)]
+    assert {type(one) for one in ended} == {Reply}, ended
+    return [one.text for one in ended]
 
 
 def once(server, count):
@@ -87,11 +87,11 @@ def test_a_batch_asks_and_answers_as_single_calls_do(route, disk):
         single = ask(make_model(with_fields(config, batch=False)), *requests)
         in_order = {one.sample: one.raw for one in other_server.seen}
     assert {one.sample: one.raw for one in server.seen} == in_order
-    for place, (one, other) in enumerate(zip(ended, single, strict=True)):
+    assert [one.finish for one in ended] == ["stop", "length", "stop"]
+    for one, other in zip(ended, single, strict=True):
         assert one.batched
-        assert one.finish == ("length" if place == 1 else "stop")
         assert one.cost_usd == pytest.approx(other.cost_usd / 2)
-        if place != 1:
+        if one.finish == "stop":
             alike = {"batched": False, "latency_s": 0.0, "cost_usd": None, "billed_usd": None}
             assert one.model_copy(update=alike) == other.model_copy(update=alike)
     assert server.keys == {KEY}
@@ -220,21 +220,21 @@ def test_once_a_model_is_stopped_its_draft_is_not_sent_and_costs_nothing(disk, m
     assert budget.spent_usd == pytest.approx(disk.lines[0].most_usd[0])
 
 
-def test_what_does_not_fit_goes_out_in_further_batches(route, disk, monkeypatch):
+@pytest.mark.parametrize(
+    ("limit", "most", "size"),
+    [
+        ("most_requests", 2, len),
+        ("most_bytes", 4_000, lambda requests: len(json.dumps([body for _, body in requests]))),
+    ],
+)
+def test_what_does_not_fit_goes_out_in_further_batches(route, disk, monkeypatch, limit, most, size):
     config = config_at(route, "http://localhost:9")
-    kind = type(PROVIDERS[config.provider](config))
-    monkeypatch.setattr(kind, "most_requests", 2)
-    server, ended = served(route, disk, requests_of(5), BatchFaults())
-    assert len(texts(ended)) == 5
-    assert sorted(len(made.requests) for made in server.made) == [1, 2, 2]
-    assert once(server, 5)
-
-    monkeypatch.setattr(kind, "most_requests", 9)
-    monkeypatch.setattr(kind, "most_bytes", 4_000)
-    server, ended = served(route, Disk(disk.folder), requests_of(5), BatchFaults())
+    monkeypatch.setattr(PROVIDERS[config.provider], limit, most)
+    server, ended = served(route, disk, requests_of(5))
     assert len(texts(ended)) == 5
     assert 1 < len(server.made) < 5
-    assert max(len(json.dumps([body for _, body in m.requests])) for m in server.made) <= 4_000
+    assert max(size(made.requests) for made in server.made) <= most
+    assert once(server, 5)
 
 
 @pytest.mark.parametrize(("shares", "first"), [(2.5, 2), (0.5, 0)])
@@ -242,10 +242,10 @@ def test_a_cost_limit_is_kept_by_the_dearest_case_of_what_is_sent(disk, shares, 
     """The limit is so many requests at their dearest; what is left of it pays for the next."""
     requests = requests_of(4)
     free = Disk(disk.folder / "free")
-    served("direct", free, requests, BatchFaults(), budget=Budget(1e9))
+    served("direct", free, requests, budget=Budget(1e9))
     most_usd = free.lines[0].most_usd[0]
     budget = Budget(shares * most_usd)
-    server, ended = served("direct", disk, requests, BatchFaults(), budget=budget)
+    server, ended = served("direct", disk, requests, budget=budget)
     assert [len(made.requests) for made in server.made][:1] == [first] * bool(first)
     answered = [one for one in ended if isinstance(one, Reply)]
     assert len(answered) == sum(server.asked.values())
@@ -259,12 +259,12 @@ def test_what_is_in_the_cache_is_not_asked_and_answers_go_there(route, tmp_path)
     cache = tmp_path / "replies.sqlite"
     requests = requests_of(2)
     disk = Disk(tmp_path, cache)
-    server, (first,) = served(route, disk, requests[:1], BatchFaults())
+    server, (first,) = served(route, disk, requests[:1])
     with serving(route) as (_, config), ReplyCache(cache) as kept:
         found, single = ask(make_model(with_fields(config, batch=False), cache=kept), *requests)
     assert (found.cached, found.batched, found.cost_usd) == (True, True, first.cost_usd)
     assert (single.cached, single.batched) == (False, False)
-    server, ended = served(route, Disk(tmp_path / "other", cache), requests, BatchFaults())
+    server, ended = served(route, Disk(tmp_path / "other", cache), requests)
     assert not server.calls
     assert [one.cost_usd for one in ended] == [first.cost_usd, single.cost_usd]
 
@@ -326,34 +326,29 @@ def test_a_request_is_in_the_last_batch_that_was_not_lost(batches):
     assert [one.token for one in under_way(lines, "m")] == waits
 
 
-@st.composite
-def result_lines(draw):
-    """Lines with the names of requests of this and of other batches, some of them broken."""
-    names = st.integers(0, 5).map(lambda n: custom_id(Batch(TOKEN), n)) | st.sampled_from(
-        ["pb0-x", "pb0--1", "pb01-1", "pb0-1-1", "pb0-", "-", "", "pb0-٣", "pb0-99999999999"]
-    )
-    return draw(st.lists(st.tuples(names, st.booleans())))
+# Names of requests of this and of other batches.
+names = st.integers(0, 5).map(lambda n: custom_id(Batch(TOKEN), n)) | st.sampled_from(
+    ["pb0-x", "pb0--1", "pb01-1", "pb0-1-1", "pb0-", "-", "", "pb0-٣", "pb0-99999999999"]
+)
 
 
-@given(lines=result_lines(), requests=st.integers(0, 4))
+@given(st.lists(st.tuples(names, st.booleans())), st.integers(0, 4))
 def test_the_first_whole_line_of_a_request_answers_it(lines, requests):
-    whole = [
-        json.dumps({"custom_id": name, "response": {"status_code": 200, "body": {"n": n}}})
-        for n, (name, _) in enumerate(lines)
-    ]
-    kept = [
-        text if is_whole else text[:-9] for text, (_, is_whole) in zip(whole, lines, strict=True)
-    ]
+    texts = []
+    for n, (name, is_whole) in enumerate(lines):
+        response = {"status_code": 200, "body": {"n": n}}
+        text = json.dumps({"custom_id": name, "response": response})
+        texts.append(text if is_whole else text[:-9])
     batch = Batch(TOKEN, most_usd=dict.fromkeys(map(str, range(requests))))
     provider = PROVIDERS["openai"](ModelConfig(name="m", id="openai/m"))
-    answers = answers_of("\n\n".join(kept).encode(), provider, batch)
+    answers = answers_of("\n\n".join(texts).encode(), provider, batch)
+    found = {key: json.loads(answer.body) for key, answer in answers.items()}
+    expected = {}
     for place in range(requests):
-        name = custom_id(batch, place)
-        first = [n for n, (found, is_whole) in enumerate(lines) if found == name and is_whole]
-        answer = answers.get(str(place))
-        assert (answer is not None) == bool(first)
-        if answer is not None:
-            assert json.loads(answer.body) == {"n": first[0]}
+        wanted = (custom_id(batch, place), True)
+        if wanted in lines:
+            expected[str(place)] = {"n": lines.index(wanted)}
+    assert found == expected
 
 
 @given(st.sampled_from(["openai", "anthropic", "gemini"]), DOCUMENTS)
@@ -386,11 +381,11 @@ def test_results_that_are_not_there_yet_are_not_taken_for_none(disk):
 def test_headers_that_requests_need_go_with_their_batch(disk):
     schema = {"type": "object", "properties": {}, "additionalProperties": False}
     form = {"type": "json_schema", "json_schema": {"name": "a", "strict": True, "schema": schema}}
-    betas = []
+    betas = {"create": set(), "look": set(), "results": set()}
 
     class Noting(AnthropicBatches):
         def key_of(self, request):
-            betas.append(request.headers.get("anthropic-beta", ""))
+            betas[self.calls[-1]].add(request.headers.get("anthropic-beta", ""))
             return super().key_of(request)
 
     fields = {"id": "anthropic/claude-sonnet-4-5", "response_format": "always"}
@@ -398,5 +393,6 @@ def test_headers_that_requests_need_go_with_their_batch(disk):
         request = replace(make_request(), response_format=form)
         (reply,) = run_command(with_fields(config, **fields), disk, [request])
     assert isinstance(reply, Reply)
-    assert betas[0].startswith("structured-outputs")
-    assert set(betas[2:]) == {""}
+    (beta,) = betas.pop("create")
+    assert beta.startswith("structured-outputs")
+    assert betas == {"look": {""}, "results": {""}}
