@@ -26,7 +26,7 @@ from tests.models.factory import (
     Killing,
     command,
     look_up,
-    make_request,
+    requests_of,
     run_command,
 )
 from tests.servers.batches import AnthropicBatches, BatchFaults, GeminiBatches, OpenAIBatches
@@ -176,7 +176,7 @@ batch_faults = st.builds(
 @fuzzed(15)
 @given(batch_faults, st.lists(st.integers(0, 25), max_size=3))
 def test_batches(kind, route, faults, kills):
-    requests = [replace(make_request(f"{n:03d}"), sample=f"s{n}") for n in range(ASKED)]
+    requests = requests_of(ASKED)
     policy = replace(QUICK, attempts=3)
     with tempfile.TemporaryDirectory() as folder, Running(kind(batch=faults)) as running:
         server = running.server

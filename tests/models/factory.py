@@ -103,7 +103,13 @@ def make_request(
     messages = (Message("system", ("You assemble blocks.",)), Message("user", user))
     given = {"temperature": 0.5, "top_p": 0.9, "max_tokens": 128, **params}
     subject = PlanSubject(SCENE, CANDIDATES)
-    return Request(key, seed, messages, given, "prompt-1", subject, track="full_planning")
+    named = {"track": "full_planning", "sample": key}
+    return Request(key, seed, messages, given, "prompt-1", subject, **named)
+
+
+def requests_of(count: int) -> list[Request]:
+    """So many requests, each about another sample."""
+    return [make_request(f"{n:03}") for n in range(count)]
 
 
 def make_model(

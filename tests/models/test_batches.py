@@ -29,6 +29,7 @@ from tests.models.factory import (
     look_up,
     make_model,
     make_request,
+    requests_of,
     run_command,
     with_fields,
 )
@@ -52,10 +53,6 @@ def disk(tmp_path):
 
 def config_at(route, url, **fields):
     return ROUTES[route].config(url, batch=True, price=PRICE, **fields)
-
-
-def requests_of(count):
-    return [replace(make_request(f"{n:03d}"), sample=f"{n:03d}") for n in range(count)]
 
 
 @contextlib.contextmanager

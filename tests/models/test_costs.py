@@ -33,6 +33,7 @@ from tests.models.factory import (
     ask,
     make_model,
     make_request,
+    requests_of,
     with_fields,
 )
 from tests.servers.chassis import Faults, Running
@@ -242,8 +243,7 @@ def test_a_server_that_does_not_count_stops_within_the_limit(route, usage):
         tariff = Tariff(input=10.0, output=100.0)
         dearest = most_usd(tariff, asked.prompt_tokens, asked.most_completion_tokens)
 
-        requests = [make_request(f"{n:03}") for n in range(40)]
-        answers = ask(make_model(config, budget=budget), *requests)
+        answers = ask(make_model(config, budget=budget), *requests_of(40))
     replies = [answer for answer in answers if isinstance(answer, Reply)]
     assert {type(answer) for answer in answers} == {Reply, BudgetReachedError}
     assert 0 < len(replies) == server.requests <= 0.1 / dearest
@@ -267,7 +267,7 @@ def test_a_failure_that_may_have_been_billed_counts_against_the_budget(mode, is_
 
 def test_a_reply_says_what_the_limit_counts_for_all_its_attempts(tmp_path):
     server = ROUTES["direct"].server(Faults({"reset": 0.2, "html": 0.2, "500": 0.2}))
-    requests = [make_request(f"{n:03}") for n in range(30)]
+    requests = requests_of(30)
     with Running(server) as running, ReplyCache(tmp_path / "c.sqlite") as cache:
         config = ROUTES["direct"].config(running.url, price=PRICE)
         budget = Budget(100.0)

@@ -1,30 +1,45 @@
-"""Limits, retries and cancellations: when a request is sent, how often, and when no more."""
+"""Limits, retries and cancellations: when a request is sent, how often, and when no more; the
+servers of a model: the load is even, outages lose nothing.
+"""
 
 import asyncio
 import heapq
 import itertools
+from collections import Counter
+from contextlib import ExitStack
+from dataclasses import dataclass, field
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from phyblock.config.models import ModelConfig
-from phyblock.errors import (
-    ModelError,
-    RefusedError,
-    RetryableError,
-    SampleError,
-    StoreError,
-    UnavailableError,
-)
+from phyblock import errors
+from phyblock.errors import ModelError, RetryableError, UnavailableError
 from phyblock.models.cache import ReplyCache, reply_key
 from phyblock.models.client import HttpClient
-from phyblock.models.costs import Budget
-from phyblock.models.model import Clock, Limits, RetryPolicy, Server, Servers
+from phyblock.models.costs import Budget, ModelBudget
+from phyblock.models.model import (
+    MOST_CONNECTION_FAILURES,
+    ChatModel,
+    Clock,
+    Limits,
+    RetryPolicy,
+    Server,
+    Servers,
+)
 from phyblock.records.record import Reply
-from tests.models.factory import ROUTES, ask, make_model, make_request
+from tests.models.factory import (
+    ROUTES,
+    answers,
+    ask,
+    make_model,
+    make_request,
+    requests_of,
+    with_fields,
+)
 from tests.servers.chassis import Faults, Running
-from tests.workspace import in_a_loop
+from tests.servers.openai_chat import OpenAIChat
+from tests.workspace import in_a_loop, until
 
 
 class FakeTime:
@@ -35,9 +50,8 @@ class FakeTime:
         self._sleepers: list[tuple[float, int, asyncio.Future[None]]] = []
         self._numbers = itertools.count()
 
-    @property
-    def clock(self):
-        return Clock(lambda: self.now_s, self.sleep)
+    def policy(self, **fields):
+        return RetryPolicy(clock=Clock(lambda: self.now_s, self.sleep), **fields)
 
     async def sleep(self, seconds):
         wake = asyncio.get_running_loop().create_future()
@@ -60,11 +74,15 @@ class FakeTime:
             task.result()
 
 
-def limits_of(most, overall, clock=None, **fields):
+def servers_of(count, policy, client=None):
+    made = (Server(f"http://replica:{n}", client) for n in range(1, count + 1))
+    return Servers(tuple(made), policy, lambda _: None)
+
+
+def limits_of(most, overall, time=None, **fields):
     """The limits of a model at one server."""
-    config = ModelConfig(name="m", id="openai/m", max_concurrency=most, **fields)
-    policy = RetryPolicy(clock=clock or Clock())
-    return Limits(config, overall, Servers((Server("http://one:1", None),), policy, print))
+    config = ROUTES["direct"].config("http://replica:1", max_concurrency=most, **fields)
+    return Limits(config, overall, servers_of(1, (time or FakeTime()).policy()))
 
 
 calls = st.lists(
@@ -82,7 +100,7 @@ async def test_requests_and_tokens_of_a_minute_keep_to_their_limits(arrivals, rp
     starts, ends = [], []
     inside = 0
     time = FakeTime()
-    limits = limits_of(width, asyncio.Semaphore(width), time.clock, rpm=rpm, tpm=tpm)
+    limits = limits_of(width, asyncio.Semaphore(width), time, rpm=rpm, tpm=tpm)
 
     async def call(at_s, takes_s, most, unused):
         nonlocal inside
@@ -111,8 +129,8 @@ async def test_requests_and_tokens_of_a_minute_keep_to_their_limits(arrivals, rp
 async def test_a_model_waiting_for_its_minute_holds_no_place_that_another_could_use():
     time = FakeTime()
     overall = asyncio.Semaphore(1)
-    slow = limits_of(5, overall, time.clock, rpm=1)
-    quick = limits_of(5, overall, time.clock)
+    slow = limits_of(5, overall, time, rpm=1)
+    quick = limits_of(5, overall, time)
     finished_s = 0.0
 
     async def call(limits):
@@ -158,22 +176,18 @@ async def test_limits_survive_those_that_give_up(plans, width):
         await asyncio.wait_for(overall.acquire(), 1)
 
 
-class Script:
+class Script(FakeTime):
     """Raises the given errors one by one, each after `takes_s`, then answers; sleeps are jumps."""
 
-    def __init__(self, *errors, takes_s=0.0):
-        self.errors = list(errors)
-        self.takes_s = takes_s
-        self.now_s = 0.0
-        self.failed_at: list[float] = []
-        self.calls = 0
-        self.waits: list[float] = []
+    def __init__(self, *found, takes_s=0.0):
+        super().__init__()
+        self.errors, self.takes_s = list(found), takes_s
+        self.sent_s, self.waits = [], []
 
     async def send(self):
-        self.calls += 1
         self.now_s += self.takes_s
+        self.sent_s.append(self.now_s)
         if self.errors:
-            self.failed_at.append(self.now_s)
             raise self.errors.pop(0)
         return "answer"
 
@@ -182,16 +196,16 @@ class Script:
         self.now_s += seconds
 
     def run(self, **policy):
-        rules = RetryPolicy(clock=Clock(lambda: self.now_s, self.sleep), **policy)
-
         async def main():
-            return await rules.retrying("m", lambda _: None)(self.send)
+            return await self.policy(**policy).retrying("m", lambda _: None)(self.send)
 
         return asyncio.run(main())
 
 
-FINAL = [SampleError("bad"), RefusedError("no"), UnavailableError("gone"), StoreError([])]
-FINAL += [ModelError("x"), ZeroDivisionError(), asyncio.CancelledError()]
+FINAL = [
+    *(kind("no") for kind in (errors.SampleError, errors.RefusedError, UnavailableError)),
+    *(errors.StoreError([]), ModelError("x"), ZeroDivisionError(), asyncio.CancelledError()),
+]
 
 
 @pytest.mark.parametrize("error", FINAL)
@@ -199,8 +213,7 @@ def test_nothing_but_a_retryable_error_is_sent_again(error):
     script = Script(error)
     with pytest.raises(type(error)):
         script.run()
-    assert script.calls == 1
-    assert script.waits == []
+    assert (len(script.sent_s), script.waits) == (1, [])
 
 
 statuses = st.sampled_from([None, 408, 429, 500, 502, 503])
@@ -219,7 +232,7 @@ def test_a_request_is_given_up_when_both_number_and_time_are_over(
     script = Script(*errors, takes_s=takes_s)
     with pytest.raises(RetryableError):
         script.run(attempts=attempts, retry_for_s=retry_for_s, base_s=2.0)
-    lasted = [now_s - script.failed_at[0] for now_s in script.failed_at]
+    lasted = [now_s - script.sent_s[0] for now_s in script.sent_s]
     is_over = [n >= attempts and s >= retry_for_s for n, s in enumerate(lasted, 1)]
     assert is_over[-1]
     assert not any(is_over[:-1])
@@ -230,7 +243,7 @@ def test_answers_that_were_paid_for_and_cannot_be_read_are_bounded_by_number_alo
     script = Script(*(RetryableError("malformed", status=status) for _ in range(20)))
     with pytest.raises(RetryableError, match="malformed"):
         script.run(attempts=3)
-    assert script.calls == 3
+    assert len(script.sent_s) == 3
 
 
 @given(st.lists(st.none() | st.floats(0, 500), min_size=1, max_size=7))
@@ -256,8 +269,7 @@ def test_a_request_under_way_is_answered_and_a_second_cancellation_gives_it_up(
         with ReplyCache(tmp_path / "c.sqlite") as cache:
             model = make_model(config, cache=cache, budget=budget)
             asked = asyncio.create_task(model.ask(make_request()))
-            while not server.requests:
-                await asyncio.sleep(0.001)
+            await asyncio.to_thread(until, lambda: server.requests)
             for _ in range(cancels):
                 asked.cancel()
                 await asyncio.sleep(0.01)
@@ -290,8 +302,7 @@ def test_whatever_is_waited_for_a_cancellation_ends_the_wait_and_nothing_is_sent
         budget = Budget(200.0) if where == "budget" else None
         model = make_model(config, budget=budget, policy=RetryPolicy())
         asked = [asyncio.create_task(model.ask(make_request("000")))]
-        while not (server.requests if where != "retry" else server.ended["429"]):
-            await asyncio.sleep(0.001)
+        await asyncio.to_thread(until, lambda: server.requests)
         await asyncio.sleep(0.05)
         if where != "retry":
             asked.append(asyncio.create_task(model.ask(make_request("001"))))
@@ -326,3 +337,224 @@ def test_a_bug_of_ours_is_neither_sent_again_nor_charged(monkeypatch):
         with pytest.raises(KeyError):
             ask(make_model(config, budget=budget), make_request())
         assert (calls, budget.spent_usd) == (1, 0.0)
+
+
+# The servers of a model.
+
+REFUSED = RetryableError("connection refused", sent="no")
+
+
+@dataclass
+class Outage:
+    """A client whose server is away from `begins_s` until `ends_s`; calls take `takes_s`."""
+
+    begins_s: float
+    ends_s: float
+    takes_s: float
+    time: FakeTime = field(default_factory=FakeTime)
+    failed: int = 0
+    answered: int = 0
+
+    def is_away(self):
+        return self.begins_s <= self.time.now_s < self.ends_s
+
+    async def complete(self, _):
+        was_away = self.is_away()
+        if not was_away:
+            await self.time.sleep(self.takes_s)
+        if was_away or self.is_away():
+            self.failed += 1
+            raise RetryableError(str(REFUSED), sent="lost")
+        self.answered += 1
+        return Reply(text="Step1: Move block with index 1")
+
+    async def aclose(self):
+        pass
+
+
+def ask_through(client, *, samples, width, was_heard=False):
+    """Ask as a run does, `width` samples at once, a stopped model no more."""
+    found = []
+
+    async def main():
+        config = ROUTES["direct"].config("http://replica:1", max_concurrency=width)
+        policy, report = client.time.policy(), lambda _: None
+        servers = servers_of(1, policy, client)
+        servers.all[0].was_heard = was_heard
+        limits = Limits(config, asyncio.Semaphore(width), servers)
+        parts = {"servers": servers, "limits": limits, "budget": ModelBudget(Budget())}
+        model = ChatModel(config=config, policy=policy, report=report, **parts)
+        queue = requests_of(samples)
+
+        async def work():
+            while queue:
+                request = queue.pop(0)
+                try:
+                    found.append(await model.ask(request))
+                except ModelError as error:
+                    found.append(error)
+                    if isinstance(error, UnavailableError):
+                        queue.clear()
+
+        await client.time.run_until_done(*(asyncio.create_task(work()) for _ in range(width)))
+
+    asyncio.run(main())
+    return found
+
+
+@settings(max_examples=40)
+@given(st.floats(0, 30), st.floats(1, 280), st.floats(0.1, 20), st.integers(1, 12))
+def test_an_outage_loses_nothing(begins_s, lasts_s, takes_s, width):
+    client = Outage(begins_s, begins_s + lasts_s, takes_s)
+    answers = ask_through(client, samples=40, width=width, was_heard=True)
+    assert [type(answer) for answer in answers] == [Reply] * 40
+    assert client.answered == 40
+    # All that are under way, each twice, then single ones at growing distances.
+    assert client.failed <= 2 * width + 35
+
+
+@pytest.mark.parametrize("width", [2, 8, 32])
+def test_a_wrong_address_stops_the_model_after_few_attempts_and_leaves_its_samples(width):
+    client = Outage(0.0, float("inf"), 1.0)
+    answers = ask_through(client, samples=500, width=width)
+    assert {type(answer) for answer in answers} == {UnavailableError}
+    assert len(answers) == width
+    assert "http://replica:1 could not be reached for" in str(answers[0])
+    assert str(REFUSED) in str(answers[0])
+    assert client.failed <= width * MOST_CONNECTION_FAILURES
+    assert 18 <= client.time.now_s < 300
+
+
+@settings(max_examples=20)
+@given(st.floats(30, 60), st.integers(2, 12))
+def test_a_server_that_has_answered_is_tried_for_as_long_as_the_policy_says(begins_s, width):
+    client = Outage(begins_s, float("inf"), 5.0)
+    answers = ask_through(client, samples=500, width=width)
+    replies = [answer for answer in answers if isinstance(answer, Reply)]
+    assert len(replies) == client.answered > 0
+    assert "http://replica:1 could not be reached for 3" in str(answers[-1])
+    assert begins_s + 290 <= client.time.now_s < begins_s + 420
+
+
+@settings(max_examples=60)
+@given(
+    st.integers(1, 6),
+    st.lists(st.tuples(st.booleans(), st.integers(0, 50)), max_size=60),
+    st.data(),
+)
+def test_whoever_is_asked_is_there_and_has_no_more_to_do_than_any_other_that_is(
+    count, events, data
+):
+    servers = servers_of(count, FakeTime().policy())
+    gone = data.draw(st.sets(st.integers(0, count - 1), max_size=count - 1))
+    for number in (*gone, *gone):
+        servers.failed(servers.all[number], REFUSED, servers.policy.clock.now())
+    there = [server for number, server in enumerate(servers.all) if number not in gone]
+    assert servers.cooling_s() == 0.0
+    held = []
+    for begins, number in events:
+        if begins:
+            least = min(one.under_way for one in there)
+            held.append(servers.chosen())
+            server = held[-1].__enter__()
+            assert server in there
+            assert server.under_way == least + 1
+        elif held:
+            held.pop(number % len(held)).__exit__(None, None, None)
+
+
+@pytest.mark.parametrize("status", [400, 500, None, 429, 529])
+def test_a_server_that_answers_or_is_late_is_never_given_up(status):
+    """It rests only where it is asked too much."""
+    time = FakeTime()
+    servers = servers_of(1, time.policy())
+    error = RetryableError("x", status=status, sent="answered" if status else "maybe")
+    for _ in range(50):
+        time.now_s += servers.cooling_s() + 20
+        servers.failed(servers.all[0], error, time.now_s)
+        assert 0.0 <= servers.cooling_s() < 1.0
+        assert (servers.cooling_s() > 0) == (status in (429, 529))
+
+
+@given(st.none() | st.floats(0, 1000), st.integers(0, 20))
+def test_the_next_try_waits_as_long_as_the_server_asks(asked_s, tries):
+    time = FakeTime()
+    policy = time.policy(retry_for_s=1e9)
+    servers = servers_of(1, policy)
+    error = RetryableError("overloaded", status=503, retry_after_s=asked_s)
+    least_s = min(asked_s or 0.0, policy.max_retry_after_s)
+    for number in range(tries):
+        servers.failed(servers.all[0], error, time.now_s)
+        wait_s = servers.cooling_s()
+        assert wait_s == pytest.approx(max(least_s, policy.base_s * number))
+        if wait_s:
+            # What was sent before shows nothing new.
+            servers.failed(servers.all[0], error, time.now_s)
+            assert servers.all[0].failures == number + 1
+        time.now_s += wait_s
+        assert servers.cooling_s() == 0.0
+    with servers.chosen():
+        assert (servers.cooling_s() > 0) == (tries > 1), "a server that is away gets one request"
+    assert servers.cooling_s() == 0.0
+
+
+@given(st.sampled_from([429, 529]), st.floats(0.5, 100))
+def test_after_a_429_nobody_asks_before_the_server_wants(status, wait_s):
+    time = FakeTime()
+    servers = servers_of(2, time.policy())
+    first, second = servers.all
+    servers.failed(first, RetryableError("slow down", status=status, retry_after_s=wait_s), 0.0)
+    assert servers.cooling_s() == 0.0
+    with servers.chosen() as server:
+        assert server is second
+    longer = RetryableError("slow down", status=status, retry_after_s=wait_s + 20)
+    servers.failed(second, longer, 0.0)
+    servers.failed(second, RetryableError("slow down", status=status), 0.0)
+    assert servers.cooling_s() == pytest.approx(wait_s)
+
+
+def at(*urls, route="direct", **fields):
+    """The model of a route at all these addresses."""
+    config = ROUTES[route].config(urls[0], **fields)
+    return with_fields(config, api_base=tuple(url + ROUTES[route].path for url in urls))
+
+
+@pytest.mark.parametrize("route", ["direct", pytest.param("openai", marks=pytest.mark.slow)])
+def test_servers_that_die_in_the_middle_lose_nothing(route):
+    servers = [OpenAIChat(Faults(latency_s=0.01), width=1) for _ in range(4)]
+
+    async def main(running):
+        config = at(*(one.url for one in running), route=route)
+        model = make_model(config, policy=RetryPolicy(base_s=0.01, max_wait_s=0.05))
+        asking = asyncio.create_task(answers(model, *requests_of(120)))
+        await asyncio.to_thread(until, lambda: sum(server.ended["ok"] for server in servers) >= 40)
+        for one in running[1:]:
+            one.die()
+        return await asking
+
+    with ExitStack() as stack:
+        found = asyncio.run(main([stack.enter_context(Running(server)) for server in servers]))
+    assert [type(answer) for answer in found] == [Reply] * 120
+    # No sample was sent again but those that were under way at a server that died.
+    asked = sum((server.by_sample for server in servers), Counter())
+    assert len(asked) == 120
+    # What one loses may come to the next before that dies.
+    assert sum(asked.values()) - 120 <= 120
+    assert sum(asked.values()) <= sum(answer.attempts for answer in found)
+
+
+def test_a_server_that_refuses_everything_is_left_out_and_the_last_one_stops_the_model():
+    events = []
+    wrong, right = OpenAIChat(Faults(mode="404")), OpenAIChat()
+    with Running(wrong) as first, Running(right) as second:
+        config = at(first.url, second.url, max_concurrency=4)
+        replies = ask(make_model(config, events=events), *requests_of(30))
+        assert [type(reply) for reply in replies] == [Reply] * 30
+        assert right.ended == {"ok": 30}
+        assert wrong.requests <= 4
+        (text,) = (event.message for event in events if event.kind == "notice")
+        assert text.startswith(f"{first.url} is not used any more: ")
+        right.faults = Faults(mode="404")
+        stopped = ask(make_model(config), *requests_of(30))
+    assert {type(answer) for answer in stopped} == {UnavailableError}
+    assert wrong.requests + right.ended["404"] <= 3 * 4
