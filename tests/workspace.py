@@ -83,7 +83,7 @@ def problem_of(error: type[PhyblockError], work: Callable[..., object], *args: o
 
 def until(is_so: Callable[[], bool]) -> None:
     """Wait for what a process or a thread of its own is about to do."""
-    end = time.monotonic() + 20
+    end = time.monotonic() + 30
     while not is_so():
         assert time.monotonic() < end
         time.sleep(0.005)

@@ -166,9 +166,7 @@ CALLS = {
 
 
 @pytest.mark.parametrize(("calls", "kind"), CALLS.values(), ids=list(CALLS))
-def test_calls_that_fail_lose_nothing_and_what_stops_is_learned_by_the_next_command(
-    route, disk, calls, kind
-):
+def test_calls_that_fail_lose_nothing_and_the_next_command_goes_on(route, disk, calls, kind):
     policy = replace(QUICK, attempts=4)
     requests, budget = requests_of(2), Budget(1e9)
     with serving(route, BatchFaults(calls=calls)) as (server, config):

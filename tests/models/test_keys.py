@@ -2,6 +2,7 @@
 
 import base64
 import html
+import itertools
 import json
 import urllib.parse
 
@@ -27,23 +28,21 @@ def config(model_id, **fields):
 
 
 @pytest.mark.parametrize(
-    ("model", "status"),
+    ("model_id", "fields", "variables", "is_needed"),
     [
-        (config("openai/o1"), KeyStatus(("OPENAI_API_KEY",), None, True)),
-        (config("openai/m", api_base="http://x"), KeyStatus(("OPENAI_API_KEY",), None, False)),
-        (config("dashscope/qwen"), KeyStatus(("DASHSCOPE_API_KEY",), None, True)),
-        (config("gemini/g"), KeyStatus(("GEMINI_API_KEY", "GOOGLE_API_KEY"), None, True)),
-        (config("hosted_vllm/m"), KeyStatus(("HOSTED_VLLM_API_KEY",), None, False)),
-        (config("vertex_ai/g"), KeyStatus(("VERTEX_AI_API_KEY",), None, False)),
-        (
-            config("openai/m", api_base="http://x", api_key_env="MINE_API_KEY"),
-            KeyStatus(("MINE_API_KEY",), None, True),
-        ),
-        (ModelConfig(name="oracle"), KeyStatus((), None, False)),
+        ("openai/o1", {}, ("OPENAI_API_KEY",), True),
+        ("openai/m", {"api_base": "http://x"}, ("OPENAI_API_KEY",), False),
+        ("dashscope/qwen", {}, ("DASHSCOPE_API_KEY",), True),
+        ("gemini/g", {}, ("GEMINI_API_KEY", "GOOGLE_API_KEY"), True),
+        ("hosted_vllm/m", {}, ("HOSTED_VLLM_API_KEY",), False),
+        ("vertex_ai/g", {}, ("VERTEX_AI_API_KEY",), False),
+        ("openai/m", {"api_base": "http://x", "api_key_env": "MINE"}, ("MINE",), True),
+        (None, {}, (), False),
     ],
 )
-def test_what_a_model_needs(model, status):
-    assert api_key_status(model) == status
+def test_what_a_model_needs(model_id, fields, variables, is_needed):
+    status = api_key_status(config(model_id, **fields))
+    assert status == KeyStatus(variables, None, is_needed)
 
 
 @pytest.mark.parametrize("value", ["", " ", "abc", "EMPTY", "no-key"])
@@ -69,10 +68,9 @@ def test_a_key_is_hidden_in_every_form(key, before, after):
         urllib.parse.quote_plus(key),
         urllib.parse.quote(key, safe="").lower() if key == key.lower() else key,
     ]
-    for form in forms:
-        for guess in (True, False):
-            text = hidden(f"{before} {form} {after}", (key,), guess=guess)
-            assert form not in text or form in f"{before} [key] {after}"
+    for form, guess in itertools.product(forms, (True, False)):
+        text = hidden(f"{before} {form} {after}", (key,), guess=guess)
+        assert form not in text or form in f"{before} [key] {after}"
 
 
 @given(KEYS, st.text(PRINTABLE.filter(lambda c: c != ":"), max_size=9))
@@ -95,9 +93,8 @@ def test_a_key_that_is_cut_at_the_end_is_hidden(key, length):
 
 
 def test_a_short_key_is_hidden_as_a_word_and_not_inside_of_others():
-    assert hidden("key s3cr! of s3cr, not xs3cr or s3crets", ("s3cr",)) == (
-        "key [key]! of [key], not xs3cr or s3crets"
-    )
+    text = hidden("key s3cr! of s3cr, not xs3cr or s3crets", ("s3cr",))
+    assert text == "key [key]! of [key], not xs3cr or s3crets"
 
 
 @pytest.mark.parametrize("bad", ["a-key\nof-mine", "a-key\x7fof-mine", "a-k\u00e9y-of-mine"])
@@ -124,9 +121,7 @@ def test_a_key_that_cannot_be_sent_is_named_by_its_variable(monkeypatch, bad):
     ],
 )
 @pytest.mark.parametrize("api_key_env", [None, "MINE_API_KEY"])
-def test_whatever_a_provider_signs_in_with_is_a_secret_and_no_key(
-    monkeypatch, model_id, variable, api_key_env
-):
+def test_what_a_provider_signs_in_with_is_a_secret(monkeypatch, model_id, variable, api_key_env):
     monkeypatch.setenv(variable, "a-long-secret-of-mine")
     config = ModelConfig(name="m", id=model_id, api_key_env=api_key_env)
     assert "a-long-secret-of-mine" in secrets_of(config)

@@ -225,9 +225,7 @@ statuses = st.sampled_from([None, 408, 429, 500, 502, 503])
     st.floats(0, 600),
     st.floats(0, 400),
 )
-def test_a_request_is_given_up_when_both_number_and_time_are_over(
-    found, attempts, retry_for_s, takes_s
-):
+def test_a_request_is_given_up_when_number_and_time_are_over(found, attempts, retry_for_s, takes_s):
     errors = (RetryableError("x", status=status) for status in found * 400)
     script = Script(*errors, takes_s=takes_s)
     with pytest.raises(RetryableError):
@@ -258,9 +256,7 @@ def test_waits_keep_to_retry_after_and_to_their_bounds(wishes):
 
 @pytest.mark.parametrize("route", ["direct", "openai"])
 @pytest.mark.parametrize("cancels", [1, 2])
-def test_a_request_under_way_is_answered_and_a_second_cancellation_gives_it_up(
-    tmp_path, route, cancels
-):
+def test_a_request_under_way_is_given_up_at_a_second_cancellation(tmp_path, route, cancels):
     server = ROUTES[route].server(Faults(latency_s=0.2))
     budget = Budget(100.0)
 
@@ -442,9 +438,7 @@ def test_a_server_that_has_answered_is_tried_for_as_long_as_the_policy_says(begi
     st.lists(st.tuples(st.booleans(), st.integers(0, 50)), max_size=60),
     st.data(),
 )
-def test_whoever_is_asked_is_there_and_has_no_more_to_do_than_any_other_that_is(
-    count, events, data
-):
+def test_whoever_is_asked_is_there_and_has_no_more_to_do_than_others(count, events, data):
     servers = servers_of(count, FakeTime().policy())
     gone = data.draw(st.sets(st.integers(0, count - 1), max_size=count - 1))
     for number in (*gone, *gone):

@@ -19,17 +19,15 @@ from phyblock.tracks.full_planning import FullPlanning, PlanSubject
 from tests.data.broken import plan_record
 from tests.fuzz.strategies import documents
 from tests.models.factory import CANDIDATES, SCENE, make_request
+from tests.workspace import problem_of
 
 STEPS = "Step1: Move block with index 3"
 
 
-def replay(folder, model="m"):
-    config = ModelConfig(name=model, replay=str(folder))
-    return build_model(config, cache=None)
-
-
-def answer(model, key, seed=0):
-    return asyncio.run(model.ask(replace(make_request(key, seed), track="full_planning")))
+def answer(folder, key, seed=0):
+    model = build_model(ModelConfig(name="m", replay=str(folder)), cache=None)
+    assert not model.needs_messages
+    return asyncio.run(model.ask(make_request(key, seed)))
 
 
 @pytest.mark.parametrize(
@@ -45,15 +43,11 @@ def answer(model, key, seed=0):
 def test_a_broken_recording_is_an_error_at_its_place(tmp_path, content, said):
     (tmp_path / "007.json").write_bytes(content)
     with pytest.raises(DataError, match=said):
-        answer(replay(tmp_path), "007")
+        answer(tmp_path, "007")
 
 
-KEPT = Reply(
-    text=STEPS,
-    reasoning="red",
-    usage=Usage(prompt_tokens=7, completion_tokens=5),
-    cost_usd=0.5,
-    seed_sent=False,
+KEPT = Reply(text=STEPS, reasoning="red", cost_usd=0.5, seed_sent=False).model_copy(
+    update={"usage": Usage(prompt_tokens=7, completion_tokens=5)}
 )
 
 
@@ -72,14 +66,10 @@ def test_a_run_of_our_own_is_matched_by_model_key_and_seed(tmp_path):
         + record("m", "008", 1, reply=None)
         + '{"model": "m", "key": "009"'
     )
-    model = replay(tmp_path)
-    assert not model.needs_messages
     kept = KEPT.model_copy(update={"cost_usd": 0.0, "attempts": 0})
-    assert answer(model, "007", 1) == kept
-    assert answer(model, "007", 2).text == "last"
-    assert answer(model, "007", 3) is None
-    assert answer(model, "008", 1) is None
-    assert answer(model, "009", 1) is None
+    found = [answer(tmp_path, *asked) for asked in (("007", 1), ("007", 2), ("007", 3))]
+    assert (found[0], found[1].text, found[2]) == (kept, "last", None)
+    assert [answer(tmp_path, key, 1) for key in ("008", "009")] == [None, None]
 
 
 @pytest.mark.parametrize(("kind", "error"), [("sample", SampleError), ("refused", RefusedError)])
@@ -87,7 +77,7 @@ def test_a_recorded_error_is_raised_again(tmp_path, kind, error):
     failed = {"kind": kind, "status": 400, "message": "no"}
     (tmp_path / "records.jsonl").write_text(record("m", "007", 1, reply=None, error=failed))
     with pytest.raises(error, match="no") as caught:
-        answer(replay(tmp_path), "007", 1)
+        answer(tmp_path, "007", 1)
     assert caught.value.status == 400
 
 
@@ -174,11 +164,9 @@ OTHERS = (
 
 @pytest.mark.parametrize("raw", OTHERS, ids=repr)
 def test_another_shape_is_an_error_that_names_the_file_and_its_keys(raw):
-    with pytest.raises(DataError) as caught:
-        read_raw_reply(raw, "outputs/x/007.json")
-    assert "outputs/x/007.json" in str(caught.value)
+    problem = problem_of(DataError, read_raw_reply, raw, "outputs/x/007.json")
     found = f"keys {', '.join(raw)}" if isinstance(raw, dict) else type(raw).__name__
-    assert caught.value.problems[0].found == found
+    assert ("outputs/x/007.json" in problem.where, problem.found) == (True, found)
 
 
 DOCUMENTS = documents(
@@ -200,7 +188,6 @@ def test_any_document_is_read_or_refused_with_a_data_error(raw):
         text.encode()
 
 
-PLANNERS = list(FullPlanning.baselines)
 keys = st.text(min_size=1, max_size=5)
 seeds = st.integers(0, 10**6)
 
@@ -239,7 +226,7 @@ def test_without_orientation_only_the_orientation_is_wrong(key, seed):
     assert wrong == [SCENE.blocks[v].type == "arch" for v in order]
 
 
-@pytest.mark.parametrize("name", PLANNERS)
+@pytest.mark.parametrize("name", FullPlanning.baselines)
 def test_what_is_drawn_depends_on_seed_and_key_alone(name):
     many = [make_request(f"{key:03}", seed) for key in range(10) for seed in range(5)]
     forwards = {(r.key, r.seed): said(name, r) for r in many}

@@ -1,24 +1,27 @@
 """Costs of a run: expected by a dry run as providers bill, and never above max_cost_usd."""
 
+import base64
+import functools
+import importlib.util
+import io
 import json
+import math
 from contextlib import ExitStack
+from pathlib import Path
 
 import pytest
+import tiktoken
+from PIL import Image
+from tokenizers import Tokenizer
 
 from phyblock.config.models import load_models
 from phyblock.config.suite import load_suite
 from phyblock.models.costs import text_tokens
 from phyblock.run.plan import estimate, make_plan
 from tests.models.factory import ROUTES
-from tests.servers.billing import COMPLETION, PROVIDERS, Bill, o200k_tokens, tile_tokens
 from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat, answered
-from tests.workspace import (
-    CALL_USD,
-    PRICE,
-    TWICE,
-    write_questions,
-)
+from tests.workspace import CALL_USD, PRICE, TWICE, write_questions
 
 MOST_USD = 0.505
 """Room for 35 calls, and for no 36th, be it as estimated at first or as the run learns to."""
@@ -64,6 +67,93 @@ def test_what_an_earlier_run_may_have_paid_counts_in_the_next(workspace, mode):
     assert server.requests * dearest_reply_usd < billed_usd <= 1
 
 
+# Servers that count and bill as providers document it, written from their documents alone: OpenAI,
+# guide to images and vision; Anthropic, vision guide; Google, media resolution guide. Texts: OpenAI
+# by its public vocabulary o200k and three tokens a message and for the reply; Anthropic by the
+# vocabulary that litellm carries of it; Google by four characters a token.
+
+COMPLETION = 40
+LITELLM = Path(importlib.util.find_spec("litellm").origin).parent
+CARRIED = LITELLM / "litellm_core_utils" / "tokenizers"
+
+
+def tile_tokens(width, height):
+    """A picture that is shown to GPT-4o: 85 tokens, and 170 for each tile of 512 pixels."""
+    if max(width, height) > 2048:
+        width, height = (side * 2048 // max(width, height) for side in (width, height))
+    if min(width, height) > 768:
+        width, height = (side * 768 // min(width, height) for side in (width, height))
+    return 85 + 170 * -(-width // 512) * -(-height // 512)
+
+
+def patch_tokens(width, height):
+    """A picture that is shown to GPT-5.6 in full: 1.2 tokens for each patch of 32 pixels."""
+    patches = -(-width // 32) * -(-height // 32)
+    assert patches <= 30_000, "the API would refuse it"
+    return math.ceil(patches * 1.2)
+
+
+def claude_tokens(width, height):
+    """A picture that is shown to Claude: a token for each patch of 28 pixels, none to shrink."""
+    assert max(width, height) <= 2576
+    return -(-width // 28) * -(-height // 28)
+
+
+@functools.cache
+def o200k():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("TIKTOKEN_CACHE_DIR", str(CARRIED))
+        return tiktoken.get_encoding("o200k_base")
+
+
+def o200k_tokens(text):
+    return len(o200k().encode(text))
+
+
+@functools.cache
+def claude():
+    return Tokenizer.from_file(str(CARRIED / "anthropic_tokenizer.json"))
+
+
+def contents(body):
+    """Texts and sizes of pictures in a request body of any of the three protocols."""
+    for name, value in body.items() if isinstance(body, dict) else enumerate(body):
+        if name in ("text", "content", "system") and isinstance(value, str):
+            yield value
+        elif name in ("url", "data"):
+            data = base64.b64decode(value.rpartition(";base64,")[2])
+            yield Image.open(io.BytesIO(data)).size
+        elif isinstance(value, dict | list):
+            yield from contents(value)
+
+
+class Bill:
+    """Counts every prompt as a provider does; `billed` has those of each sample."""
+
+    def __init__(self, text_tokens, picture_tokens, a_message=0):
+        # Vocabularies are read here, not by the thread that serves: while it imports what reads
+        # them, litellm finds that half imported.
+        text_tokens("")
+        self.billed = []
+        self._text_tokens, self._picture_tokens = text_tokens, picture_tokens
+        self._a_message = a_message
+
+    def __call__(self, seen):
+        parts = list(contents(seen.raw))
+        texts = sum(self._text_tokens(part) for part in parts if isinstance(part, str))
+        pictures = sum(self._picture_tokens(*part) for part in parts if not isinstance(part, str))
+        around = self._a_message * (len(seen.raw.get("messages", ())) + 1)
+        self.billed.append(math.ceil(texts) + pictures + around)
+        return self.billed[-1], COMPLETION
+
+
+PROVIDERS = {
+    "openai/gpt-4o-2024-08-06": (o200k_tokens, tile_tokens, 3),
+    "openai/gpt-5.6": (o200k_tokens, patch_tokens, 3),
+    "anthropic/claude-opus-5-5": (lambda text: len(claude().encode(text).ids), claude_tokens),
+    "gemini/gemini-3.8-flash": (lambda text: len(text) / 4, lambda *_: 1120),
+}
+"""By model, how its provider counts texts, pictures, and around each message."""
 TARIFF = {"input": 3.0, "output": 15.0}
 WITHIN = 0.05
 CALLS = 4
@@ -83,12 +173,11 @@ def planned(workspace):
 def begin(workspace, stack):
     """Write a suite and its models, each behind a server that bills as its provider does."""
     bills, entries = {}, {}
-    for model_id, (kind, bill) in PROVIDERS.items():
+    for model_id, counts in PROVIDERS.items():
         provider, _, name = model_id.partition("/")
-        bills[name] = bill()
-        url = stack.enter_context(Running(kind(usage=bills[name]))).url + ROUTES[provider].path
-        about = {"id": model_id, "api_base": url, "temperature": None, "price": TARIFF}
-        entries[name] = about
+        route, bills[name] = ROUTES[provider], Bill(*counts)
+        url = stack.enter_context(Running(route.server(usage=bills[name]))).url + route.path
+        entries[name] = {"id": model_id, "api_base": url, "temperature": None, "price": TARIFF}
     workspace.write_yaml("models.yaml", entries)
     write_questions(workspace.root / "questions")
     workspace.write_suite(

@@ -15,6 +15,7 @@ from phyblock.records.files import STOPPED, read_stopped
 from phyblock.results.load import load_run
 from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat
+from tests.workspace import until
 
 
 class BySeed(OpenAIChat):
@@ -171,8 +172,7 @@ def locked(workspace):
 
 def test_ctrl_c_ends_a_run_whose_cache_is_locked(workspace):
     with prepare(workspace, OpenAIChat(), AT_ONCE), locked(workspace), workspace.start() as process:
-        while not catches(process.pid, signal.SIGTERM):
-            time.sleep(0.01)
+        until(lambda: catches(process.pid, signal.SIGTERM))
         time.sleep(1.0)
         process.send_signal(signal.SIGINT)
         out, err = process.communicate(timeout=60)

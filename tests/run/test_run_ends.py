@@ -1,15 +1,19 @@
-"""Runs that end before their time, by Ctrl-C, a kill or a mistake of ours: all answers are kept."""
+"""Runs that end before their time, by Ctrl-C, a kill or a mistake of ours: all answers are kept.
+
+Runs whose models are asked in batches go on by the same command.
+"""
 
 import asyncio
 import contextlib
+import itertools
 import os
+import re
 import select
 import signal
 import sqlite3
 import subprocess
 import sys
 import threading
-import time
 from functools import partial
 
 import psutil
@@ -18,20 +22,20 @@ import pytest
 from phyblock.api import run_suite
 from phyblock.config.models import load_models
 from phyblock.config.suite import load_suite
-from phyblock.errors import SimulationError
 from phyblock.records.files import STOPPED
-from phyblock.run.plan import make_plan
+from phyblock.run.plan import estimate, make_plan
 from phyblock.run.rescore import rescore
-from phyblock.run.runner import SampleDone, Session, Stopping, to_its_end
+from phyblock.run.runner import SampleDone, Session, Stopping
 from phyblock.run.store import AppendFile
 from phyblock.sim import dynamics
 from phyblock.tracks.full_planning import FullPlanning
 from phyblock.tracks.pictures import Workshop
 from phyblock.tracks.pose_planning import PosePlanning
 from tests.fork_server import killed
+from tests.servers.batches import BatchFaults, OpenAIBatches
 from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat
-from tests.workspace import SCENES, call
+from tests.workspace import SCENES, call, until
 
 SAMPLES = 20
 AT_ONCE = 4
@@ -42,26 +46,16 @@ def ended(process):
     return process.returncode, out, err
 
 
-def wait_for(condition):
-    for _ in range(3000):
-        if condition():
-            return
-        time.sleep(0.01)
-    raise AssertionError("this did not come to pass")
-
-
 def prepare(workspace, server, *names):
     limits = {"max_concurrency": AT_ONCE}
     return workspace.served(server, *names, seeds=[0, 1, 2, 3], limits=limits)
 
 
 @pytest.mark.parametrize("name", [signal.SIGINT, signal.SIGTERM])
-def test_calls_under_way_are_waited_for_and_those_that_wait_for_their_turn_are_not_sent(
-    workspace, name
-):
+def test_calls_under_way_are_waited_for_and_no_other_is_sent(workspace, name):
     with prepare(workspace, OpenAIChat(holds=True), "alpha", "beta") as server:
         process = workspace.start()
-        wait_for(lambda: server.at_once == AT_ONCE)
+        until(lambda: server.at_once == AT_ONCE)
         process.send_signal(name)
         assert f"waiting for {AT_ONCE} calls in progress" in process.stdout.readline()
         server.holds = False
@@ -85,10 +79,9 @@ def test_calls_under_way_are_waited_for_and_those_that_wait_for_their_turn_are_n
 def test_a_second_interrupt_ends_at_once(workspace):
     with prepare(workspace, OpenAIChat(Faults(mode="slow"))) as server:
         process = workspace.start()
-        wait_for(lambda: server.at_once == AT_ONCE)
+        until(lambda: server.at_once == AT_ONCE)
         process.send_signal(signal.SIGINT)
-        said = process.stdout.readline()
-        assert "Ctrl-C again" in said
+        assert "Ctrl-C again" in process.stdout.readline()
         process.send_signal(signal.SIGINT)
         code, out, err = ended(process)
     assert (code, err) == (130, "")
@@ -114,28 +107,23 @@ for folder in sys.argv[1:]:
 def test_a_program_is_interrupted_in_a_run_as_well_at_any_time(workspace):
     opening, asking, waiting = folders = [workspace.root / name for name in ("a", "b", "c")]
     told = workspace.root / "told"
+    command = [sys.executable, "-c", PROGRAM, *map(str, folders)]
     slow = OpenAIChat(Faults(latency_s=1.0))
     with prepare(workspace, slow) as server, told.open("w", encoding="utf-8") as errors:
         locked = sqlite3.connect(workspace.cache / "replies.sqlite", isolation_level=None)
         locked.execute("BEGIN EXCLUSIVE")
-        process = subprocess.Popen(
-            [sys.executable, "-c", PROGRAM, *map(str, folders)],
-            cwd=workspace.root,
-            env=workspace.env,
-            stdout=subprocess.PIPE,
-            stderr=errors,
-            text=True,
-        )
+        options = {"cwd": workspace.root, "env": workspace.env, "text": True}
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors, **options)
         with process, process.stdout as said:
             try:
                 # The reply cache is opened last; until it is unlocked, the run is not open.
-                wait_for((opening / "run.yaml").exists)
+                until((opening / "run.yaml").exists)
                 process.send_signal(signal.SIGINT)
                 locked.close()
                 assert said.readline() == "interrupted\n"
                 assert (server.requests, workspace.records(opening)) == (0, [])
 
-                wait_for(lambda: server.requests == AT_ONCE)
+                until(lambda: server.requests == AT_ONCE)
                 server.faults = Faults(mode="slow")
                 process.send_signal(signal.SIGINT)
                 assert said.readline() == "interrupted\n"
@@ -143,7 +131,7 @@ def test_a_program_is_interrupted_in_a_run_as_well_at_any_time(workspace):
                 last = told.read_text(encoding="utf-8").splitlines()[-1]
                 assert f"interrupted; waiting for {AT_ONCE} calls" in last
 
-                wait_for(lambda: server.requests == 2 * AT_ONCE)
+                until(lambda: server.requests == 2 * AT_ONCE)
                 while not select.select([said], [], [], 0.5)[0]:
                     process.send_signal(signal.SIGINT)
                 assert said.readline() == "interrupted\n"
@@ -179,10 +167,6 @@ def session(workspace, watch, model):
     return Session(plan, workspace.out, watch, use_cache=False)
 
 
-def nobody(_):
-    return
-
-
 @pytest.mark.parametrize("place", ["judge", "watch"])
 def test_a_mistake_of_ours_loses_no_call_under_way(workspace, monkeypatch, place):
     judge = FullPlanning.judge
@@ -200,7 +184,7 @@ def test_a_mistake_of_ours_loses_no_call_under_way(workspace, monkeypatch, place
         if isinstance(event, SampleDone | Stopping):
             raise ZeroDivisionError("in watch")
 
-    watch = watches_badly if place == "watch" else nobody
+    watch = watches_badly if place == "watch" else id
     if place == "judge":
         monkeypatch.setattr(FullPlanning, "judge", judges_badly)
     with Running(FirstAtOnce()) as running:
@@ -228,7 +212,7 @@ def test_an_impatient_cancellation_keeps_all_that_was_answered(workspace, monkey
         append(self, lines)
 
     async def run():
-        opened = session(workspace, nobody, "random")
+        opened = session(workspace, id, "random")
         running = asyncio.create_task(opened.run())
         await asyncio.to_thread(begun.wait, 20)
         opened.interrupt()
@@ -248,9 +232,7 @@ def test_an_impatient_cancellation_keeps_all_that_was_answered(workspace, monkey
     assert sorted(record["sample"] for record in workspace.records()) == sorted(answered)
 
 
-def test_a_reply_whose_judging_kills_workers_is_recorded_and_scored_later(
-    inside, monkeypatch, capsys
-):
+def test_a_reply_whose_judging_kills_is_recorded_and_scored_later(inside, monkeypatch, capsys):
     inside.write_suite(tracks=["pose_planning"], models=["oracle"])
     marks = inside.root / "marks"
     marks.mkdir()
@@ -258,15 +240,16 @@ def test_a_reply_whose_judging_kills_workers_is_recorded_and_scored_later(
 
     async def fatal(track, item, text, earlier):
         if text is not None and item.key == SCENES[0]["id"]:
-            await track.compute(partial(killed, marks, 2))
+            await track.work_out(partial(killed, marks, 2))
         return await whole(track, item, text, earlier)
 
     monkeypatch.setattr(PosePlanning, "judge_apart", fatal)
     call("run", "suite.yaml", "--out", "out", "--no-report", "--limit", "2")
-    lost, *others = sorted(inside.records(), key=lambda record: record["scene"])
+    lost, other = sorted(inside.records(), key=lambda record: record["scene"])
     assert lost["error"]["kind"] == "unjudged"
+    assert "was killed twice" in lost["error"]["message"]
     assert lost["reply"]["text"].startswith("Step1")
-    assert [record["outcome"] for record in others] == ["ok"]
+    assert other["outcome"] == "ok"
     told = capsys.readouterr().out
     assert "1 answer could not be judged: phyblock score out tries again, without a call" in told
     assert "rejected" not in told
@@ -288,9 +271,7 @@ def test_a_reply_whose_judging_kills_workers_is_recorded_and_scored_later(
     assert all(record["pose"]["completed"] and record["error"] is None for record in again)
 
 
-def test_a_reply_that_is_being_judged_at_a_second_interrupt_is_recorded(
-    inside, monkeypatch, capsys
-):
+def test_a_reply_that_is_judged_at_a_second_interrupt_is_recorded(inside, monkeypatch, capsys):
     inside.write_suite(tracks=["pose_planning"], models=["oracle"])
 
     async def slow(track, item, text, _):
@@ -311,43 +292,34 @@ def test_no_process_outlives_a_killed_run(workspace):
     with prepare(workspace, OpenAIChat()):
         with workspace.start("--yes") as process:
             family = []
-            while not any("spawn_main" in words for _, words in family):
-                assert process.poll() is None
+
+            def draws():
                 with contextlib.suppress(psutil.NoSuchProcess):
-                    children = psutil.Process(process.pid).children(recursive=True)
-                    family = [(child, " ".join(child.cmdline())) for child in children]
-                time.sleep(0.01)
-            os.kill(process.pid, signal.SIGKILL)
+                    family[:] = psutil.Process(process.pid).children(recursive=True)
+                    return any("spawn_main" in " ".join(child.cmdline()) for child in family)
+
+            until(draws)
+            process.kill()
             process.wait()
-        _, alive = psutil.wait_procs([child for child, _ in family], timeout=30)
+        _, alive = psutil.wait_procs(family, timeout=30)
     assert not alive
 
 
-def test_work_of_a_worker_that_was_killed_is_done_again_once(tmp_path):
-    async def work():
-        assert await shop.compute(partial(killed, tmp_path, 1)) == "done"
-        with pytest.raises(SimulationError, match="killed twice"):
-            await shop.compute(partial(killed, tmp_path, 3))
-
+def test_work_of_a_worker_that_was_killed_once_is_done_again(tmp_path):
     shop = Workshop(1)
-    try:
-        asyncio.run(work())
-    finally:
-        shop.close()
-
-
-NOWHERE = "http://127.0.0.1:9"
+    assert asyncio.run(shop.work_out(partial(killed, tmp_path, 1))) == "done"
+    shop.close()
 
 
 @pytest.mark.parametrize("words", ["HTTP 429", "no connection to 127.0.0.1:9"])
 def test_a_wait_for_another_attempt_or_for_a_server_is_given_up(workspace, words):
     with prepare(workspace, OpenAIChat(Faults(mode="429", retry_after="100"))) as server:
         if "429" not in words:
-            workspace.write_models(NOWHERE, "alpha")
+            workspace.write_models("http://127.0.0.1:9", "alpha")
         process = workspace.start()
         while words not in process.stdout.readline():
             assert process.poll() is None
-        wait_for(lambda: not server.at_once)
+        until(lambda: not server.at_once)
         process.send_signal(signal.SIGINT)
         code, out, err = ended(process)
     assert (code, err) == (130, "")
@@ -356,24 +328,108 @@ def test_a_wait_for_another_attempt_or_for_a_server_is_given_up(workspace, words
     assert server.requests <= AT_ONCE
 
 
-def test_what_must_be_done_is_done_though_nobody_waits():
-    done = []
+# Runs whose models are asked in batches.
 
-    async def work():
-        await asyncio.sleep(0.05)
-        done.append("work")
-        return "record"
 
-    async def wait():
-        return await to_its_end(work())
+def prepare_batches(workspace, url):
+    """A model that is asked in batches; `singly.yaml` is the same without them."""
+    entry = {"id": "openai/gpt-4o-2024-08-06", "api_base": f"{url}/v1"}
+    workspace.write_yaml("models.yaml", {"alpha": {**entry, "batch": True}})
+    workspace.write_yaml("singly.yaml", {"alpha": entry})
+    workspace.write_suite(models=["alpha"], limits={"batch_poll_s": 0.05}, seeds=[0, 1])
 
-    async def cancelled():
-        waiting = asyncio.create_task(wait())
-        for _ in range(3):
-            await asyncio.sleep(0.01)
-            waiting.cancel()
-        return await waiting
 
-    assert asyncio.run(cancelled()) == ("record", True)
-    assert done == ["work"]
-    assert asyncio.run(wait()) == ("record", False)
+def counted_once(server, samples):
+    """Both seeds of an item ask the same where no seeds are sent."""
+    return sum(server.asked.values()) == samples and len(set(server.asked.values())) == 1
+
+
+def test_a_run_that_waits_is_stopped_and_goes_on_by_the_same_command(workspace):
+    """Between both commands the provider is asked nothing, and the estimate asks for no money."""
+    with Running(OpenAIBatches(batch=BatchFaults(looks=10**6))) as running:
+        server = running.server
+        prepare_batches(workspace, running.url)
+        waits = threading.Event()
+
+        def moment(name):
+            # What the first look gave was told before the second.
+            if (name, server.calls.count("look")) == ("look done", 2):
+                waits.set()
+
+        server.moment = moment
+        with workspace.start("--yes") as process:
+            assert waits.wait(60)
+            process.send_signal(signal.SIGINT)
+            out, err = process.communicate()
+        assert (process.returncode, err) == (130, "")
+        assert "waiting for batch batch-0 since" in out
+        assert "0 of 10 samples are done (interrupted)" in out
+
+        dry = workspace.run("--dry-run")
+        assert "0 calls, about $0.00." in dry.out
+        other = workspace.run("--set", "sampling.temperature=0.5")
+        assert other.code == 2
+        assert "holds another run" in other.err
+
+        singly = workspace.run("--yes", "--models-file", "singly.yaml")
+        assert singly.code == 2
+        assert "has a batch in progress, whose questions would be asked twice" in singly.err
+        assert not server.by_sample
+
+        server.batch_faults = BatchFaults()
+        done = workspace.completed("--yes")
+        assert "All 10 samples are done" in done.out
+        assert counted_once(server, 10)
+
+
+def test_kills_of_the_process_lose_nothing_and_ask_nothing_twice(workspace):
+    """When a batch is made and nobody heard, then when its answers are on their way."""
+    with Running(OpenAIBatches()) as running:
+        server = running.server
+        prepare_batches(workspace, running.url)
+        kill_at(3, workspace, server)
+        assert server.calls[-1] == "create"
+        for _ in range(2):
+            refused = workspace.run("--yes")
+            assert (refused.code, refused.err) == (1, "")
+            assert "it is not known whether batch pb" in refused.out
+        (line,) = set(re.findall(r"\{.*?\}", refused.out.replace("\n", " ")))
+        with (workspace.out / "batches.jsonl").open("a") as ledger:
+            ledger.write(line.replace('"ID"', '"batch-0"') + "\n")
+        kill_at(5, workspace, server)
+        assert server.calls[-1] == "results"
+        assert not workspace.records()
+        workspace.completed("--yes")
+        assert [record["outcome"] for record in workspace.records()] == ["ok"] * 10
+        assert counted_once(server, 10)
+
+
+def kill_at(number, workspace, server):
+    """Kill a run at a moment of its server."""
+    reached, is_dead = threading.Event(), threading.Event()
+    count = itertools.count()
+
+    def moment(_):
+        if next(count) == number:
+            reached.set()
+            is_dead.wait(30)
+
+    server.moment = moment
+    with workspace.start("--yes") as process:
+        assert reached.wait(60)
+        process.kill()
+        process.wait()
+        server.moment = id
+        is_dead.set()
+
+
+def test_calls_in_batches_are_estimated_at_half_the_price(workspace):
+    prepare_batches(workspace, "http://127.0.0.1:9")
+    suite = load_suite(workspace.root / "suite.yaml")
+    costs = []
+    for name in ("models.yaml", "singly.yaml"):
+        plan = make_plan(suite, load_models(workspace.root / name), only=["alpha"])
+        rows = estimate(plan, workspace.out, use_cache=False)
+        costs.append(next((row.cost_usd, row.most_usd) for row in rows if row.calls))
+    assert min(costs[0]) > 0
+    assert [2 * usd for usd in costs[0]] == pytest.approx(costs[1])

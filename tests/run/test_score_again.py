@@ -91,9 +91,7 @@ def newest(workspace, folder):
     return by_sample(workspace.records(workspace.root / folder))
 
 
-def test_it_is_refused_until_it_is_scored_and_then_ends_as_if_today_had_begun_it(
-    begun, workspace, capsys
-):
+def test_it_is_refused_until_it_is_scored_and_ends_as_if_begun_today(begun, workspace, capsys):
     before, earlier = newest(workspace, "out"), read_manifest(workspace.out)
     files = workspace.files()
     for args in ((), ("--dry-run",)):
@@ -124,9 +122,7 @@ def test_it_is_refused_until_it_is_scored_and_then_ends_as_if_today_had_begun_it
 
 
 @pytest.mark.usefixtures("begun")
-def test_a_kill_before_either_file_is_replaced_processes_and_shards_end_in_the_same_records(
-    workspace, monkeypatch
-):
+def test_kills_processes_and_shards_end_in_the_same_records(workspace, monkeypatch):
     def records(name):
         return (workspace.root / name / "records.jsonl").read_bytes()
 

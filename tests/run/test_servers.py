@@ -40,9 +40,7 @@ def _environment(monkeypatch):
 
 
 @pytest.mark.parametrize(("variable", "model_id", "path", "server"), WAYS)
-def test_calls_go_to_the_address_and_keys_say_that_there_is_one(
-    monkeypatch, variable, model_id, path, server
-):
+def test_calls_go_to_the_address_and_keys_say_so(monkeypatch, variable, model_id, path, server):
     keys = {reply_key(config_of(model_id), make_request())}
     with Running(server()) as running:
         monkeypatch.setenv(variable, running.url + path)
