@@ -16,7 +16,7 @@ import time
 from collections.abc import Callable, Coroutine, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 import pytest
@@ -26,6 +26,9 @@ from click.testing import CliRunner, Result
 from phyblock.domain.question import CATEGORIES, LETTERS, SUBTASKS
 from phyblock.errors import PhyblockError, Problem
 from tests.fork_server import ONE_THREAD, Done, Forked, run_forked
+
+if TYPE_CHECKING:
+    from phyblock.run.plan import RunPlan
 
 Raw = dict[str, Any]
 S = TypeVar("S")
@@ -251,6 +254,12 @@ class Workspace:
         """Run, without an error."""
         return _whole(self.run(*args, **options))
 
+    def refused(self, *args: str | Path) -> str:
+        """Run with what is not accepted; what is said."""
+        done = self.run(*args)
+        assert done.code == 2, done.out + done.err
+        return done.err
+
     def does(self, *args: str | Path, **options: Any) -> Done:
         """Call the command line, without an error."""
         return _whole(self.phyblock(*args, **options))
@@ -274,6 +283,15 @@ class Workspace:
         """A copy of all of it in another folder; pictures stay shared."""
         shutil.copytree(self.root, root, symlinks=True)
         return Workspace(root, self.cache / "pictures")
+
+    def plan(self, models: str | None = "models.yaml") -> RunPlan:
+        """The plan of the suite, with the models of a file or none."""
+        from phyblock.config.models import load_models
+        from phyblock.config.suite import load_suite
+        from phyblock.run.plan import make_plan
+
+        known = {} if models is None else load_models(self.root / models)
+        return make_plan(load_suite(self.root / "suite.yaml"), known)
 
     def scored(self, name: str = "scored") -> Path:
         """Copy the run, score the copy again, and return it."""

@@ -1,10 +1,8 @@
 """Bad and nearly sound inputs of every kind a user gives, drawn for hypothesis.
 
-Each strategy gives the bytes of one file: `SUITES`, `MODELS_FILES`, `SCENES`, `QUESTIONS`,
-`CANDIDATES`, `TEMPLATES`, `PICTURES`; `OVERRIDES` gives texts for `--set`. Most begin with
-something sound and break it in one or two places, as people and disks do; some are plain noise.
-A law about them holds for whatever they give: exit code 0 or 2, and never a traceback. The amount
-and the seed of fuzzing are set by environment variables, as `make fuzz` does.
+Each strategy gives the bytes of one file, or a text for `--set`. Most begin with something sound
+and break it in one or two places, as people and disks do; some are plain noise. The amount and the
+seed of fuzzing are set by environment variables, as `make fuzz` does.
 """
 
 import io
@@ -31,10 +29,8 @@ FAULTS = int(os.environ.get("PHYBLOCK_FUZZ_FAULTS", "40"))
 KILLS = int(os.environ.get("PHYBLOCK_FUZZ_KILLS", "6"))
 """Kills of runs, over all tracks."""
 
-Test = Callable[..., Any]
 
-
-def fuzzed(percent: float) -> Callable[[Test], Test]:
+def fuzzed(percent: float) -> Callable[[Any], Any]:
     """Draw this share of all inputs for a test, the same ones for the same seed.
 
     Nothing is shrunk: a command that hangs would be tried again and again.
@@ -62,6 +58,7 @@ def documents(*keys: str, leaves: st.SearchStrategy[Any] | None = None) -> st.Se
     )
 
 
+# Texts that stand in JSON or YAML where a value belongs; not all of them are JSON or YAML.
 JSON_TOKENS = (
     *("null", "true", "-1", "0", "1e308", "-1e308", "1e999", "NaN", "-Infinity", "-0.0", "5e-324"),
     *("9" * 25, "9" * 400, "9" * 6000, "-" + "9" * 6000, "0." + "3" * 5000),
@@ -71,22 +68,16 @@ JSON_TOKENS = (
     *("[" + "0, " * 3000 + "0]", "{" + ", ".join(f'"k{i}": 0' for i in range(3000)) + "}"),
     *("", "[", '"', "}", "\\", "\x00", "'x'", "1 2", "// no"),
 )
-"""Texts that stand in JSON where a value belongs; not all of them are JSON."""
-
-YAML_TOKENS = (
+NASTY_TOKENS = (
+    *JSON_TOKENS,
     *("0x" + "f" * 6000, "0o" + "7" * 6000, "1:30:30", "190:20:30.15", ".nan", "-.inf", "~", "<<"),
     *("*none", "&a [*a]", "!!python/object:os.system x", "!mine x", "!!binary eA==", "!!set {a}"),
     *("[&a 1, *a, *a]", "{<<: 5}", "{? [a]: 1}", "|\n  x", ">-\n x", "%x", "@x", "`", "\t- 1"),
     *("$HOME", "~nobody/x", "$NOWHERE", "'" + "x" * 3000 + "'", "'\x85'", "---\na: 1", "...\n"),
 )
-NASTY_TOKENS = (*JSON_TOKENS, *YAML_TOKENS)
-"""Texts that stand in YAML where a value belongs; not all of them are YAML."""
-
-_MARK = "@@here@@"
-Place = tuple[str | int, ...]
 
 
-def _places(value: object, path: Place = ()) -> Iterator[tuple[Place, object]]:
+def _places(value: object, path: tuple[str | int, ...] = ()) -> Iterator[tuple[Any, object]]:
     """Every value in a document, with its path."""
     yield path, value
     if isinstance(value, dict | list):
@@ -108,10 +99,10 @@ def broken(draw: st.DrawFn, documents: st.SearchStrategy[Any], tokens: tuple[str
             name = draw(st.sampled_from(["no", "id ", "é", "a.b", "\x1b[1m", "<<", "x" * 2000]))
             document = with_value(document, (*draw(st.sampled_from(mappings)), name), 1)
     elif how == "token":
-        document = with_value(document, path, _MARK)
+        document = with_value(document, path, "@@here@@")
     text = json.dumps(document)
     if how == "token":
-        text = text.replace(f'"{_MARK}"', draw(st.sampled_from(tokens)))
+        text = text.replace('"@@here@@"', draw(st.sampled_from(tokens)))
     data = text.encode("utf-8", "surrogatepass")
     if how == "cut":
         data = data[: draw(st.integers(0, len(data)))]
@@ -129,7 +120,7 @@ NAMES = st.from_regex(r"[A-Za-z0-9][A-Za-z0-9._:+-]{0,20}", fullmatch=True)
 LINES = st.text(st.characters(exclude_categories=["Cs", "Cc"], exclude_characters="\ufeff"))
 
 
-def _some(items: list[Any]) -> st.SearchStrategy[list[Any]]:
+def _some(*items: Any) -> st.SearchStrategy[list[Any]]:
     return st.lists(st.sampled_from(items), min_size=1, unique=True)
 
 
@@ -146,7 +137,7 @@ SECTIONS: dict[str, dict[str, st.SearchStrategy[Any]]] = {
         "background": st.sampled_from(BACKGROUNDS),
     },
     "scoring": {
-        "matchers": _some(["optimal", "paper"]),
+        "matchers": _some("optimal", "paper"),
         "level1": st.sampled_from(["selection", "membership", "aov"]),
         "missing": st.sampled_from(["count", "skip"]),
     },
@@ -169,8 +160,8 @@ FIELDS: dict[str, st.SearchStrategy[Any]] = {
     "dataset": st.fixed_dictionaries(
         {}, optional={"format": st.just("builtin"), "path": st.sampled_from([None, "."])}
     ),
-    "levels": _some([1, 2, 3, 4]),
-    "settings": _some(["A", "B"]),
+    "levels": _some(1, 2, 3, 4),
+    "settings": _some("A", "B"),
     "seeds": st.lists(st.integers(0, 2**31 - 1), min_size=1, max_size=4, unique=True),
     "prompt": st.just("default"),
     "parser": st.sampled_from(["steps", "official"]),
@@ -188,9 +179,8 @@ SOUND_SUITES = st.fixed_dictionaries(REQUIRED, optional=FIELDS).map(
 """Mappings that are valid suites with the built-in format."""
 
 SUITES = broken(SOUND_SUITES, NASTY_TOKENS) | NOISE
-"""Suite files."""
 
-_SOUND_MODELS: dict[str, Any] = {
+_SOUND_MODELS = {
     "plain": "openai/gpt-4o-2024-08-06",
     "local": {
         "id": "hosted_vllm/qwen",
@@ -203,19 +193,25 @@ _SOUND_MODELS: dict[str, Any] = {
     "old": {"replay": "replies", "size_b": 7},
 }
 MODELS_FILES = broken(st.just(_SOUND_MODELS), NASTY_TOKENS) | NOISE
-"""Models files."""
 
 _SOUND_SCENE = tower("t1", [1, 2], ("red", "blue"))
 SCENES = broken(st.just(_SOUND_SCENE), JSON_TOKENS) | NOISE
-"""One line of `scenes.jsonl` (noise may hold more lines)."""
 
 _SOUND_CANDIDATES = [{**one, "position": n} for n, one in enumerate(_SOUND_SCENE["candidates"], 1)]
 CANDIDATES = broken(st.just(_SOUND_CANDIDATES), JSON_TOKENS) | NOISE
-"""A candidate file of the official layout."""
 
 
 def sound_question(scene_id: str = "t1") -> dict[str, Any]:
     """A question about a scene of two blocks, every field of a recipe in it."""
+    picture = {
+        "label": "scene",
+        "view": [45.0, 22.0],
+        "without": [2],
+        "poses": {"1": {"position": [0, 0, 0.02], "euler": [0, 0, 0]}},
+        "swap": {"1": {"type": "cube", "color": "blue"}},
+        "marks": [{"letter": "A", "position": [0, 0, 0.1]}],
+        "framed": True,
+    }
     return {
         "id": "q1",
         "subtask": "CO",
@@ -225,23 +221,12 @@ def sound_question(scene_id: str = "t1") -> dict[str, Any]:
         "options": ["1", "2", "3", "4"],
         "answer": "A",
         "colors": {"1": "green"},
-        "pictures": [
-            {
-                "label": "scene",
-                "view": [45.0, 22.0],
-                "without": [2],
-                "poses": {"1": {"position": [0, 0, 0.02], "euler": [0, 0, 0]}},
-                "swap": {"1": {"type": "cube", "color": "blue"}},
-                "marks": [{"letter": "A", "position": [0, 0, 0.1]}],
-                "framed": True,
-            }
-        ],
+        "pictures": [picture],
         "evidence": {"count": 1, "orders": [1]},
     }
 
 
 QUESTIONS = broken(st.just(sound_question()), JSON_TOKENS) | NOISE
-"""One line of `questions.jsonl`."""
 
 _PIECES = (
     *("{{", "}}", "{%", "%}", "{#", "#}", "\n", " ", "x", "1", "'a'", "|", ".", "(", ")", "[", "]"),
@@ -258,7 +243,6 @@ TEMPLATES = (
     )
     | NOISE
 )
-"""Prompt templates."""
 
 
 def png_header(width: int, height: int) -> bytes:
@@ -296,7 +280,6 @@ PICTURES = (
     )
     | NOISE
 )
-"""Picture files."""
 
 _KEYS = ("seeds", "images.size_px", "name", "limits.a.b", "", ".", "a" * 500, "x." * 200 + "x")
 OVERRIDES = st.builds(
@@ -305,4 +288,3 @@ OVERRIDES = st.builds(
     st.sampled_from(["=", "=", "=", "", ":"]),
     st.sampled_from(NASTY_TOKENS) | st.text(st.characters(exclude_categories=["Cs"]), max_size=20),
 )
-"""Texts for `--set`."""

@@ -2,7 +2,6 @@
 batches under faults and kills; costs under whatever usage is reported.
 """
 
-import json
 import math
 import random
 import tempfile
@@ -18,7 +17,8 @@ from phyblock.errors import RetryableError, SampleError
 from phyblock.models.costs import Budget
 from phyblock.records.record import Reply
 from tests.fuzz.laws import LedgerChat, watched
-from tests.fuzz.strategies import FAULTS, SEED, fuzzed
+from tests.fuzz.strategies import FAULTS as NUMBER
+from tests.fuzz.strategies import SEED, fuzzed
 from tests.models.factory import (
     QUICK,
     ROUTES,
@@ -30,33 +30,28 @@ from tests.models.factory import (
     run_command,
 )
 from tests.servers.batches import AnthropicBatches, BatchFaults, GeminiBatches, OpenAIBatches
-from tests.servers.chassis import Faults, Running
+from tests.servers.chassis import FAULTS, Faults, Running
 from tests.servers.faults import WIRE_FAULTS
 from tests.servers.openai_chat import OpenAIChat
-from tests.workspace import PRICE, SCENES, questions, vqa_suite, write_questions
+from tests.workspace import PRICE, SCENES, questions, read_lines, vqa_suite, write_questions
 
 pytestmark = pytest.mark.fuzz
 
 _SHARE = 0.35
-_LONGEST_S = 300.0
 _TRACKS = {
-    "full_planning": {},
-    "vqa": vqa_suite(subtasks=["SH", "OR", "VP"]),
-    "step_planning": {"tracks": ["step_planning"], "steps": {"physics": "off"}},
+    "full_planning": (5, {}),
+    "vqa": (12, vqa_suite(subtasks=["SH", "OR", "VP"])),
+    "step_planning": (15, {"tracks": ["step_planning"], "steps": {"physics": "off"}}),
 }
-_ASKED_PER_SEED = {"full_planning": 5, "vqa": 12, "step_planning": 15}
-"""At least so many requests."""
+"""By track: at least how many requests a seed makes, and the suite."""
 _TRANSPORTS = ("direct", "litellm")
 _CELLS = [
     pytest.param(track, transport, marks=[] if n == 0 else [pytest.mark.slow])
     for n, (track, transport) in enumerate((t, w) for w in _TRANSPORTS for t in _TRACKS)
 ]
-_PASSING = (
-    *("429", "500", "reset", "cut", "html", "empty", "400"),
-    *(name for name, fault in WIRE_FAULTS.items() if fault.ending != "unavailable"),
-)
-_STOPPING = tuple(name for name, fault in WIRE_FAULTS.items() if fault.ending == "unavailable")
-_QUOTA = math.ceil(FAULTS / len(_CELLS))
+_STOPPING = [name for name, fault in WIRE_FAULTS.items() if fault.ending == "unavailable"]
+_PASSING = [*FAULTS, "400", *(name for name in WIRE_FAULTS if name not in _STOPPING)]
+_QUOTA = math.ceil(NUMBER / len(_CELLS))
 """Faults that each track meets over each transport."""
 
 
@@ -68,21 +63,20 @@ def prepare(workspace, url, track, transport, seeds):
     workspace.write_models(url, "alpha", **fields)
     limits = {"max_concurrency": 24, "timeout_s": 20.0}
     asked = {"models": ["alpha"], "seeds": seeds, "limits": limits}
-    workspace.write_suite(**{"images": {"size_px": 128}, **_TRACKS[track], **asked})
+    workspace.write_suite(**{"images": {"size_px": 128}, **_TRACKS[track][1], **asked})
 
 
 def run(workspace, *args):
     """Run the suite of a workspace, which holds the laws of commands."""
     words = ["run", "suite.yaml", "--out", str(workspace.out), "--no-report", "--yes", *args]
-    ended, broken = watched(words, workspace, [workspace.out.name], longest_s=_LONGEST_S)
+    ended, broken = watched(words, workspace, [workspace.out.name], longest_s=300.0)
     holds(broken)
     return ended
 
 
 def holds(broken):
     """Fail with the laws that were broken."""
-    told = [f"{one.name}: {one.detail}" for one in broken]
-    assert not told, "\n".join(told[:20])
+    assert not (told := [f"{one.name}: {one.detail}" for one in broken]), "\n".join(told[:20])
 
 
 def one_round(workspace, server, track):
@@ -116,7 +110,7 @@ def one_round(workspace, server, track):
 
 @pytest.mark.parametrize(("track", "transport"), _CELLS)
 def test_faults(workspace, tallies, track, transport):
-    seeds = math.ceil(_QUOTA * (1 - _SHARE) / _SHARE / _ASKED_PER_SEED[track]) + 1
+    seeds = math.ceil(_QUOTA * (1 - _SHARE) / _SHARE / _TRACKS[track][0]) + 1
     met = Counter()
     n = 0
     while sum(met.values()) < _QUOTA:
@@ -205,7 +199,7 @@ def test_batches(kind, route, faults, kills):
         assert set(answered.values()) == {1}, answered
 
 
-@pytest.mark.parametrize("number", range(-(-FAULTS // 40)))
+@pytest.mark.parametrize("number", range(-(-NUMBER // 40)))
 def test_no_more_is_spent_than_the_limit_and_what_was_under_way(workspace, tallies, number):
     draw = random.Random(f"{SEED} costs {number}")
     limit = 10 ** draw.uniform(-1, 2)
@@ -221,11 +215,8 @@ def test_no_more_is_spent_than_the_limit_and_what_was_under_way(workspace, talli
     with workspace.served(OpenAIChat(usage=usage), entry=entry, seeds=list(range(8))):
         done = workspace.run("--set", f"limits.max_cost_usd={limit}")
         assert done.code in (0, 1), done.err
-    ended = {}
-    sent = set()
-    spent_at_last = 0.0
-    for line in (workspace.out / "calls.jsonl").read_text(encoding="utf-8").splitlines():
-        call = json.loads(line)
+    ended, sent, spent_at_last = {}, set(), 0.0
+    for call in read_lines(workspace.out / "calls.jsonl"):
         if call.get("ended"):
             ended[call["call"]] = call["billed_usd"]
         else:

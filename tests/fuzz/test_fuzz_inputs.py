@@ -12,30 +12,53 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.data.broken import YAML_TEXTS, checkout_files, sound_scene
+from tests.fuzz import strategies as bad
 from tests.fuzz.laws import Bench, Case
-from tests.fuzz.strategies import (
-    CANDIDATES,
-    JSON_TOKENS,
-    MODELS_FILES,
-    NASTY_TOKENS,
-    NOISE,
-    OVERRIDES,
-    PICTURES,
-    QUESTIONS,
-    SCENES,
-    SUITES,
-    TEMPLATES,
-    broken,
-    fuzzed,
-)
+from tests.fuzz.strategies import JSON_TOKENS, NASTY_TOKENS, NOISE, broken, fuzzed
+from tests.workspace import SCENES, questions, vqa_suite, write_questions
 
 pytestmark = pytest.mark.fuzz
 
-Cases = st.SearchStrategy[Case]
-
 RUN = ("run", "suite.yaml", "--out", "fresh", "--no-report")
 DRY = ("run", "suite.yaml", "--dry-run")
+STEPS = ("--set", "tracks=[step_planning]", "--set", "steps.physics=off")
+IN_OUT = ("report/ch1/thesis.tex", "figures/mine.svg", "tables/mine.csv", "notes.md")
 LASTING = ("thesis/ch1.tex", "suite.yaml", "models.yaml", "data/scenes.jsonl")
+
+
+@pytest.fixture(scope="module")
+def sound(new_workspace):
+    """A folder with a sound suite, models, scenes, questions, and files of the user's own."""
+    made = new_workspace(*SCENES[:2])
+    made.write_suite(models=["random"])
+    write_questions(made.root / "questions", questions(SCENES[:2], 1, ("SH", "OR")))
+    asked = {"name": "asked", "dataset": {"path": "./data"}, **vqa_suite(), "models": ["random"]}
+    made.write_yaml("questions.yaml", asked)
+    made.write_yaml("models.yaml", {"old": {"replay": "replies"}, "far": "openai/gpt-4o"})
+    write(made.root, "thesis/ch1.tex")
+    return made
+
+
+@pytest.fixture(scope="module")
+def ended(sound, tmp_path_factory):
+    """The same with a finished run of each track: `out`, `steps` and `asked`."""
+    made = sound.copied(tmp_path_factory.mktemp("ended") / "w")
+    for words in (
+        ("suite.yaml", "--out", "out", "--models", "random,oracle"),
+        ("suite.yaml", "--out", "steps", "--models", "oracle", *STEPS),
+        ("questions.yaml", "--out", "asked"),
+    ):
+        made.does("run", *words, "--no-report")
+    write(made.root / "out", *IN_OUT)
+    return made
+
+
+def write(folder, *names):
+    for name in names:
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text("precious", encoding="utf-8")
+
 
 _TEXTS = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0"), max_size=12)
 _NO_FILES = st.sampled_from(
@@ -155,17 +178,17 @@ _ASK = ("run", "questions.yaml", "--dry-run")
 _ELSEWHERE = _TEXTS.filter(lambda text: ".." not in text and text[:1] not in ("/", "~"))
 
 KINDS = {
-    "suites": _file("bad.yaml", SUITES, ("validate", "bad.yaml"), ("run", "bad.yaml", "--dry-run")),
-    "models": _file("models.yaml", MODELS_FILES, ("validate", "models.yaml"), ("models",), DRY),
-    "overrides": st.lists(OVERRIDES, min_size=1, max_size=3).map(
+    "suites": _file("x.yaml", bad.SUITES, ("validate", "x.yaml"), ("run", "x.yaml", "--dry-run")),
+    "models": _file("models.yaml", bad.MODELS_FILES, ("validate", "models.yaml"), ("models",), DRY),
+    "overrides": st.lists(bad.OVERRIDES, min_size=1, max_size=3).map(
         lambda texts: Case((*DRY, *_sets(texts)))
     ),
     # A run whose --out was not drawn writes to results.
     "arguments": _ARGUMENTS.map(lambda args: Case(args, may_write=("fresh", "results"))),
-    "scenes": _file("data/scenes.jsonl", SCENES, ("validate", "data"), _AUDIT, DRY, RUN),
-    "questions": _file("questions/questions.jsonl", QUESTIONS, ("validate", "questions"), _ASK),
-    "prompts": _file("mine.j2", TEMPLATES, (*RUN, *_PROMPTED), (*DRY, *_PROMPTED)),
-    "pictures": st.builds(_official, PICTURES, st.none() | CANDIDATES),
+    "scenes": _file("data/scenes.jsonl", bad.SCENES, ("validate", "data"), _AUDIT, DRY, RUN),
+    "questions": _file("questions/questions.jsonl", bad.QUESTIONS, ("validate", "questions"), _ASK),
+    "prompts": _file("mine.j2", bad.TEMPLATES, (*RUN, *_PROMPTED), (*DRY, *_PROMPTED)),
+    "pictures": st.builds(_official, bad.PICTURES, st.none() | bad.CANDIDATES),
     "replies": st.builds(_replies, _REPLY_FILES, _REPLY_FILES),
     "places": st.builds(_place_case, _PLACES | _ELSEWHERE, st.booleans(), NOISE),
 }
@@ -185,24 +208,22 @@ _OF_RUN = {
     "steps": (
         ("report", "steps", "--print"),
         ("show", "steps", "step_planning/oracle/t1/s0"),
-        ("run", "suite.yaml", "--out", "steps", "--no-report", "--models", "oracle",
-         "--set", "tracks=[step_planning]", "--set", "steps.physics=off"),
+        ("run", "suite.yaml", "--out", "steps", "--no-report", "--models", "oracle", *STEPS),
     ),
     "asked": (
         ("report", "asked", "--print"),
         ("score", "asked"),
         ("run", "questions.yaml", "--out", "asked", "--no-report"),
     ),
-}  # fmt: skip
+}
 _GROWING = ("records.jsonl", "calls.jsonl", "prompts.jsonl")
-_IN_OUT = ("report/ch1/thesis.tex", "figures/mine.svg", "tables/mine.csv", "notes.md")
 
 
 def run_cases(root):
     """Cases about the finished runs in `root`: a line of a file that grows, or the manifest."""
     found = []
     for run, commands in _OF_RUN.items():
-        own = tuple(f"{run}/{name}" for name in _IN_OUT) if run == "out" else ()
+        own = tuple(f"{run}/{name}" for name in IN_OUT) if run == "out" else ()
         for name in (*_GROWING, "run.yaml"):
             path = root / run / name
             if not path.exists():
@@ -214,16 +235,14 @@ def run_cases(root):
 
 
 def _manifests(path):
-    manifest = yaml.safe_load(path.read_text(encoding="utf-8"))
     whole = path.read_bytes()
-    texts = st.sampled_from([*map(str.encode, YAML_TEXTS.values())])
     # A field that is not known may hold anything; one that is written already is there twice.
     added = st.builds(
-        lambda field, text: whole + field + b": " + text + b"\n",
-        st.sampled_from([b"mine", b"created", b"limit", b"scenes", b"scenes_by_level"]),
-        texts,
+        lambda field, text: whole + f"{field}: {text}\n".encode(),
+        st.sampled_from(["mine", "created", "limit", "scenes", "scenes_by_level"]),
+        st.sampled_from([*YAML_TEXTS.values()]),
     )
-    return broken(st.just(manifest), NASTY_TOKENS) | added
+    return broken(st.just(yaml.safe_load(whole)), NASTY_TOKENS) | added
 
 
 def _with_bad_line(path):

@@ -28,21 +28,20 @@ def config(model_id, **fields):
 
 
 @pytest.mark.parametrize(
-    ("model_id", "fields", "variables", "is_needed"),
+    ("fields", "variables", "is_needed"),
     [
-        ("openai/o1", {}, ("OPENAI_API_KEY",), True),
-        ("openai/m", {"api_base": "http://x"}, ("OPENAI_API_KEY",), False),
-        ("dashscope/qwen", {}, ("DASHSCOPE_API_KEY",), True),
-        ("gemini/g", {}, ("GEMINI_API_KEY", "GOOGLE_API_KEY"), True),
-        ("hosted_vllm/m", {}, ("HOSTED_VLLM_API_KEY",), False),
-        ("vertex_ai/g", {}, ("VERTEX_AI_API_KEY",), False),
-        ("openai/m", {"api_base": "http://x", "api_key_env": "MINE"}, ("MINE",), True),
-        (None, {}, (), False),
+        ({"id": "openai/o1"}, ("OPENAI_API_KEY",), True),
+        ({"id": "openai/m", "api_base": "http://x"}, ("OPENAI_API_KEY",), False),
+        ({"id": "dashscope/qwen"}, ("DASHSCOPE_API_KEY",), True),
+        ({"id": "gemini/g"}, ("GEMINI_API_KEY", "GOOGLE_API_KEY"), True),
+        ({"id": "hosted_vllm/m"}, ("HOSTED_VLLM_API_KEY",), False),
+        ({"id": "vertex_ai/g"}, ("VERTEX_AI_API_KEY",), False),
+        ({"id": "openai/m", "api_base": "http://x", "api_key_env": "MINE"}, ("MINE",), True),
+        ({}, (), False),
     ],
 )
-def test_what_a_model_needs(model_id, fields, variables, is_needed):
-    status = api_key_status(config(model_id, **fields))
-    assert status == KeyStatus(variables, None, is_needed)
+def test_what_a_model_needs(fields, variables, is_needed):
+    assert api_key_status(ModelConfig(name="m", **fields)) == KeyStatus(variables, None, is_needed)
 
 
 @pytest.mark.parametrize("value", ["", " ", "abc", "EMPTY", "no-key"])

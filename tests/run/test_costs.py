@@ -14,14 +14,12 @@ import tiktoken
 from PIL import Image
 from tokenizers import Tokenizer
 
-from phyblock.config.models import load_models
-from phyblock.config.suite import load_suite
 from phyblock.models.costs import text_tokens
-from phyblock.run.plan import estimate, make_plan
+from phyblock.run.plan import estimate
 from tests.models.factory import ROUTES
 from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat, answered
-from tests.workspace import CALL_USD, PRICE, TWICE, write_questions
+from tests.workspace import CALL_USD, PRICE, TWICE, vqa_suite, write_questions
 
 MOST_USD = 0.505
 """Room for 35 calls, and for no 36th, be it as estimated at first or as the run learns to."""
@@ -32,11 +30,9 @@ def spent(workspace):
 
 
 def test_the_limit_is_not_passed_and_a_higher_one_goes_on(workspace):
-    with workspace.served(
-        OpenAIChat(), entry={"price": PRICE, "max_tokens": 100}, seeds=list(range(12))
-    ) as server:
-        dry = workspace.completed("--dry-run")
-        assert "60 calls, about $" in dry.out
+    entry, seeds = {"price": PRICE, "max_tokens": 100}, list(range(12))
+    with workspace.served(OpenAIChat(), entry=entry, seeds=seeds) as server:
+        assert "60 calls, about $" in workspace.completed("--dry-run").out
         first = workspace.run("--set", f"limits.max_cost_usd={MOST_USD}")
         assert (first.code, first.err) == (1, "")
         assert f"of ${MOST_USD} spent; the next call can cost $" in first.out
@@ -49,8 +45,7 @@ def test_the_limit_is_not_passed_and_a_higher_one_goes_on(workspace):
         assert workspace.run("--set", f"limits.max_cost_usd={MOST_USD}").code == 1
         assert server.requests == asked
 
-        more = workspace.completed("--set", "limits.max_cost_usd=5")
-        assert "All 60 samples are done" in more.out
+        assert "All 60 samples" in workspace.completed("--set", "limits.max_cost_usd=5").out
         assert server.requests == 60
 
 
@@ -165,39 +160,24 @@ def _environment(workspace, monkeypatch):
     monkeypatch.setenv("PHYBLOCK_CACHE", str(workspace.root / "nothing"))
 
 
-def planned(workspace):
-    loaded = load_suite(workspace.root / "suite.yaml")
-    return make_plan(loaded, load_models(workspace.root / "models.yaml"))
-
-
-def begin(workspace, stack):
-    """Write a suite and its models, each behind a server that bills as its provider does."""
-    bills, entries = {}, {}
-    for model_id, counts in PROVIDERS.items():
-        provider, _, name = model_id.partition("/")
-        route, bills[name] = ROUTES[provider], Bill(*counts)
-        url = stack.enter_context(Running(route.server(usage=bills[name]))).url + route.path
-        entries[name] = {"id": model_id, "api_base": url, "temperature": None, "price": TARIFF}
-    workspace.write_yaml("models.yaml", entries)
-    write_questions(workspace.root / "questions")
-    workspace.write_suite(
-        tracks=["full_planning", "vqa"],
-        vqa={"path": "./questions"},
-        images={"size_px": 512},
-        models=list(bills),
-        limit=CALLS // 2,
-    )
-    return bills
-
-
 def dollars(prompt_tokens, replies):
     return (prompt_tokens * TARIFF["input"] + replies * COMPLETION * TARIFF["output"]) / 1e6
 
 
 def test_a_dry_run_is_near_the_bill_of_every_provider(workspace):
+    """Each model is behind a server that bills as its provider does."""
+    bills, entries = {}, {}
     with ExitStack() as stack:
-        bills = begin(workspace, stack)
-        plan = planned(workspace)
+        for model_id, counts in PROVIDERS.items():
+            provider, _, name = model_id.partition("/")
+            route, bills[name] = ROUTES[provider], Bill(*counts)
+            url = stack.enter_context(Running(route.server(usage=bills[name]))).url + route.path
+            entries[name] = {"id": model_id, "api_base": url, "temperature": None, "price": TARIFF}
+        workspace.write_yaml("models.yaml", entries)
+        write_questions(workspace.root / "questions")
+        fields = vqa_suite() | {"tracks": ["full_planning", "vqa"], "images": {"size_px": 512}}
+        workspace.write_suite(**fields, models=list(bills), limit=CALLS // 2)
+        plan = workspace.plan()
         rows = estimate(plan, workspace.out, use_cache=False)
         workspace.completed("--yes", "--no-cache")
         left = estimate(plan, workspace.out, use_cache=False)
@@ -219,7 +199,7 @@ def test_texts_count_as_the_public_vocabulary_does(workspace, track):
     workspace.write_models("http://localhost:1", "m")
     suite = {"name": "s", "tracks": [track], "models": ["m"], "limit": 4}
     workspace.write_yaml("suite.yaml", suite)
-    (opened,) = planned(workspace).tracks
+    (opened,) = workspace.plan().tracks
     texts = [
         part
         for item in opened.items
@@ -238,7 +218,7 @@ def test_episodes_are_billed_no_more_than_a_dry_run_expects(workspace):
         entry = {"id": "openai/gpt-4o-2024-08-06", "api_base": f"{running.url}/v1", "price": TARIFF}
         workspace.write_yaml("models.yaml", {"m": entry})
         workspace.write_suite(tracks=["step_planning"], models=["m"], limit=2)
-        plan = planned(workspace)
+        plan = workspace.plan()
         (row,) = estimate(plan, workspace.out, use_cache=False)
         workspace.completed("--yes", "--no-cache")
     assert len(bill.billed) <= row.calls
@@ -248,12 +228,9 @@ def test_episodes_are_billed_no_more_than_a_dry_run_expects(workspace):
 
 
 def test_a_run_without_a_limit_counts_once_there_is_one(workspace):
-    with workspace.served(
-        OpenAIChat(Faults({"500": 0.5})),
-        entry={"price": PRICE, "max_tokens": 100},
-        seeds=[0, 1, 2, 3],
-        limits={**TWICE, "max_attempts": 1},
-    ) as server:
+    suite = {"seeds": [0, 1, 2, 3], "limits": {**TWICE, "max_attempts": 1}}
+    entry = {"price": PRICE, "max_tokens": 100}
+    with workspace.served(OpenAIChat(Faults({"500": 0.5})), entry=entry, **suite) as server:
         assert workspace.run("--yes").code == 1
         asked, answered = server.requests, server.ended["ok"]
         assert 0 < answered < asked == 20

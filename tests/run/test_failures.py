@@ -1,6 +1,7 @@
 """Failures of a provider and of the reply cache: retried, recorded by kind, said once."""
 
 import contextlib
+import itertools
 import re
 import signal
 import sqlite3
@@ -31,23 +32,18 @@ class BySeed(OpenAIChat):
         return seen
 
 
-def is_scored(record):
-    """True if a record has a score of every setting and matcher."""
-    found = {(s["setting"], s["matcher"]) for s in record["scores"] if s["criterion"] == "aov"}
-    return found == {(setting, matcher) for setting in "AB" for matcher in ("optimal", "paper")}
-
-
 def coverage(workspace):
     table = load_run(workspace.out).table("coverage").astype(str)
     return {row["model"]: row for row in table.to_dict("records")}
 
 
 def test_a_model_that_cannot_answer_is_stopped_alone(workspace):
-    servers = [OpenAIChat(Faults(mode=mode)) for mode in ("401", "404", "ok")]
-    with Running(servers[0]) as locked, Running(servers[1]) as unknown, Running(servers[2]) as fine:
-        urls = {"locked": locked.url, "unknown": unknown.url, "fine": fine.url}
-        workspace.write_served(urls)
-        workspace.write_suite(models=list(urls), seeds=list(range(20)))
+    modes = {"locked": "401", "unknown": "404", "fine": "ok"}
+    servers = {name: OpenAIChat(Faults(mode=mode)) for name, mode in modes.items()}
+    with contextlib.ExitStack() as stack:
+        at = {name: stack.enter_context(Running(server)) for name, server in servers.items()}
+        workspace.write_served({name: running.url for name, running in at.items()})
+        workspace.write_suite(models=list(modes), seeds=list(range(20)))
         done = workspace.run("--set", "limits.max_concurrency=6")
         assert (done.code, done.err) == (1, "")
         assert "locked was stopped: HTTP 401: Incorrect API key provided" in done.out
@@ -57,19 +53,17 @@ def test_a_model_that_cannot_answer_is_stopped_alone(workspace):
         stopped = read_stopped(workspace.out).models
         told = {name: why[:8] for name, why in stopped.items()}
         assert told == {"locked": "HTTP 401", "unknown": "HTTP 404"}
-        assert max(servers[0].requests, servers[1].requests) <= 6
+        assert max(servers[name].requests for name in told) <= 6
         told = coverage(workspace)
-        assert [(told[name]["ok"], told[name]["expected"]) for name in urls] == [
-            ("0", "100"), ("0", "100"), ("100", "100"),
-        ]  # fmt: skip
+        assert [int(told[name]["ok"]) for name in modes] == [0, 0, 100]
+        assert {row["expected"] for row in told.values()} == {"100"}
 
         # The key is set right, the name too: the same command asks for what is missing alone.
-        for server in servers:
+        for server in servers.values():
             server.faults = Faults()
-        again = workspace.completed("--set", "limits.max_concurrency=6")
-    assert "All 300 samples are done" in again.out
+        assert "All 300 samples" in workspace.completed("--set", "limits.max_concurrency=6").out
     assert not (workspace.out / STOPPED).exists()
-    assert [server.ended["ok"] for server in servers] == [100, 100, 100]
+    assert {server.ended["ok"] for server in servers.values()} == {100}
 
 
 def test_a_model_that_is_stopped_waits_for_no_other_attempt(workspace):
@@ -102,7 +96,10 @@ def test_each_way_to_fail_is_an_outcome_of_its_own(workspace):
         records = workspace.records()
         found = {(record["seed"], record["outcome"]) for record in records}
         assert found == set(enumerate(outcomes))
-        assert all(is_scored(record) for record in records)
+        for record in records:
+            whole = [score for score in record["scores"] if score["criterion"] == "aov"]
+            scored = {(score["setting"], score["matcher"]) for score in whole}
+            assert scored == set(itertools.product("AB", ("optimal", "paper")))
         assert workspace.run().code == 1
         assert server.requests == 30
     told = coverage(workspace)["alpha"]
@@ -119,26 +116,36 @@ def prepare(workspace, server, at_once=1):
     return workspace.served(server, seeds=[0, 1, 2, 3], limits={"max_concurrency": at_once})
 
 
-@pytest.mark.parametrize("room", [3, SAMPLES - 1])
-def test_a_cache_that_takes_no_more_is_said_once_and_all_is_recorded(workspace, room):
+@contextlib.contextmanager
+def opened_cache(workspace, begin=""):
+    """The reply cache, which another process may hold."""
     path = workspace.cache / "replies.sqlite"
     ReplyCache(path).close()
-    db = sqlite3.connect(path)
-    db.execute(
-        f"CREATE TRIGGER full BEFORE INSERT ON replies WHEN (SELECT count(*) FROM replies) >= "
-        f"{room} BEGIN SELECT RAISE(ABORT, 'the disk is full'); END"
-    )
-    with prepare(workspace, OpenAIChat()) as server:
+    with contextlib.closing(sqlite3.connect(path, isolation_level=None)) as db:
+        db.execute(begin)
+        yield db
+
+
+def locked(workspace):
+    return opened_cache(workspace, "BEGIN IMMEDIATE")
+
+
+@pytest.mark.parametrize("room", [3, SAMPLES - 1])
+def test_a_cache_that_takes_no_more_is_said_once_and_all_is_recorded(workspace, room):
+    with opened_cache(workspace) as db, prepare(workspace, OpenAIChat()) as server:
+        db.execute(
+            "CREATE TRIGGER full BEFORE INSERT ON replies WHEN (SELECT count(*) FROM replies) >= "
+            f"{room} BEGIN SELECT RAISE(ABORT, 'the disk is full'); END"
+        )
         done = workspace.completed()
         (said,) = [line for line in done.out.splitlines() if "the disk is full" in line]
-        assert str(path) in said
+        assert str(workspace.cache / "replies.sqlite") in said
         assert "going on without it" in said
         assert f"All {SAMPLES} samples are done" in done.out
         assert server.ended == {"ok": SAMPLES}
         assert [record["outcome"] for record in workspace.records()] == ["ok"] * SAMPLES
         assert db.execute("SELECT count(*) FROM replies").fetchone() == (room,)
         db.execute("DROP TRIGGER full")
-        db.close()
         workspace.completed()
         assert server.requests == SAMPLES
 
@@ -160,19 +167,15 @@ def test_a_disk_that_takes_neither_replies_nor_records_ends_the_run_after_few_ca
         assert len({record["sample"] for record in workspace.records()}) == SAMPLES
 
 
-@contextlib.contextmanager
-def locked(workspace):
-    """Hold the reply cache as another process would."""
-    path = workspace.cache / "replies.sqlite"
-    ReplyCache(path).close()
-    with contextlib.closing(sqlite3.connect(path, isolation_level=None)) as db:
-        db.execute("BEGIN IMMEDIATE")
-        yield
-
-
 def test_ctrl_c_ends_a_run_whose_cache_is_locked(workspace):
+    def catches_sigterm():
+        """As a process that asks models does."""
+        status = Path(f"/proc/{process.pid}/status").read_text(encoding="utf-8")
+        (mask,) = re.findall(r"^SigCgt:\s*(\w+)", status, re.MULTILINE)
+        return int(mask, 16) >> (signal.SIGTERM - 1) & 1
+
     with prepare(workspace, OpenAIChat(), AT_ONCE), locked(workspace), workspace.start() as process:
-        until(lambda: catches(process.pid, signal.SIGTERM))
+        until(catches_sigterm)
         time.sleep(1.0)
         process.send_signal(signal.SIGINT)
         out, err = process.communicate(timeout=60)
@@ -186,10 +189,3 @@ def test_a_run_with_a_locked_cache_ends_as_without_one(workspace):
         done = workspace.completed()
         assert done.out.count("database is locked") == 1
         assert server.requests == SAMPLES
-
-
-def catches(pid, number):
-    """True if a process has its own handler of a signal, as one that asks models has of SIGTERM."""
-    status = Path(f"/proc/{pid}/status").read_text(encoding="utf-8")
-    (mask,) = re.findall(r"^SigCgt:\s*(\w+)", status, re.MULTILINE)
-    return bool(int(mask, 16) >> (number - 1) & 1)

@@ -16,7 +16,7 @@ from phyblock.run import manifest, rescore, store
 from tests.run.test_track_runs import by_sample
 from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat, answered
-from tests.workspace import call
+from tests.workspace import call, problem_of
 
 EARLIER = 5
 
@@ -25,15 +25,14 @@ class Stopping(OpenAIChat):
     """Takes no key any more once it has given so many answers; `answered` names their requests."""
 
     def __init__(self, answers):
-        super().__init__(say=answered)
-        self.answers = answers
-        self.answered: list[str] = []
+        super().__init__(say=self.said)
+        self.answers, self.answered = answers, []
 
-    def reply(self, seen, ending):
+    def said(self, seen):
         self.answered.append(seen.sample)
         if len(self.answered) >= self.answers:
             self.faults = Faults(mode="401")
-        return super().reply(seen, ending)
+        return answered(seen)
 
 
 def run(out, *args):
@@ -95,9 +94,8 @@ def test_it_is_refused_until_it_is_scored_and_ends_as_if_begun_today(begun, work
     before, earlier = newest(workspace, "out"), read_manifest(workspace.out)
     files = workspace.files()
     for args in ((), ("--dry-run",)):
-        with pytest.raises(StoreError, match="by another version") as refused:
-            run("out", *args)
-        (problem,) = refused.value.problems
+        problem = problem_of(StoreError, run, "out", *args)
+        assert "by another version" in str(problem)
         assert f"readers {EARLIER}" in problem.found
         assert problem.hint.startswith("phyblock score out first")
     assert workspace.files() == files
