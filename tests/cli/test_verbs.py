@@ -98,32 +98,22 @@ def test_a_model_at_hand_needs_no_litellm(model, monkeypatch):
     assert model.partition("/")[0] in known_providers(ModelConfig(name="m", id=model))
 
 
-@pytest.fixture(scope="module")
-def played(new_workspace):
-    """A run of oracle and repeat; in some of eight seeds the oracle lets the bar fall."""
-    workspace = new_workspace(raw_of(seesaw()))
-    workspace.write_suite(
-        tracks=["step_planning"],
-        models=["oracle", "repeat"],
-        seeds=list(range(8)),
-        steps={"physics": "strict"},
-    )
+def test_an_episode_is_told_by_the_outcome_of_each_step_and_its_end(workspace):
+    """In some of eight seeds the oracle lets the bar fall."""
+    workspace.write_scenes(raw_of(seesaw()))
+    suite = {"models": ["oracle", "repeat"], "seeds": [*range(8)], "steps": {"physics": "strict"}}
+    workspace.write_suite(tracks=["step_planning"], **suite)
     workspace.completed("--no-cache")
-    return workspace
-
-
-def test_an_episode_is_told_by_the_outcome_of_each_step_and_its_end(played):
-    endings = {r["seed"]: r["ending"] for r in played.records() if r["model"] == "oracle"}
+    endings = {r["seed"]: r["ending"] for r in workspace.records() if r["model"] == "oracle"}
     assert set(endings.values()) == {"completed", "collapsed"}
     fallen = next(seed for seed, ending in endings.items() if ending == "collapsed")
-    assert "Collapsed" in played.does("show", "out", f"oracle/seesaw/s{fallen}").out
-    (task,) = read_builtin(played.root / "data").tasks
-    for episode in read_records(played.root / "out"):
+    assert "Collapsed" in workspace.does("show", "out", f"oracle/seesaw/s{fallen}").out
+    (task,) = read_builtin(workspace.root / "data").tasks
+    for episode in read_records(workspace.out):
         course, built = episode.course(""), episode.built(task)
         whys = [None if one in ("placed", "done") else one for one in episode.outcomes]
-        assert [why for _, why in course.steps] == whys
+        assert ([why for _, why in course.steps], course.ending) == (whys, episode.ending)
         assert len(built) == 3 - course.missing == episode.outcomes.count("placed")
-        assert course.ending == episode.ending
         assert set(built) <= set(task.scene.blocks)
 
 
@@ -156,16 +146,15 @@ def folder(tmp_path):
     return write_run(tmp_path / "run", records, facts)
 
 
-def call(*words, typed=""):
+def printed(*words, typed=""):
     words = [str(word) for word in words]
-    return CliRunner().invoke(phyblock, words, typed, catch_exceptions=False)
+    return CliRunner().invoke(phyblock, words, typed, catch_exceptions=False).output
 
 
 def test_tables_print_all_or_one_in_any_form(folder):
-    printed = ("report", folder, "--print")
-    one = call(*printed, "--only", "errors").output
-    assert one in call(*printed).output
-    assert r"\begin{tabular}" in call(*printed, "--only", "cost", "--format", "tex").output
+    words = ("report", folder, "--print")
+    assert printed(*words, "--only", "errors") in printed(*words)
+    assert r"\begin{tabular}" in printed(*words, "--only", "cost", "--format", "tex")
     assert not (folder / "tables").exists()
 
 
@@ -174,22 +163,23 @@ def test_the_cache_is_listed_and_the_replies_of_one_model_are_deleted(tmp_path, 
     with ReplyCache(tmp_path / "replies.sqlite") as cache:
         for key, model in enumerate(("openai/a", "openai/a", "openai/b")):
             cache.put(str(key), model, Reply(text="Step1"))
-    listed = call("cache").output
-    found = re.findall(r"^(openai/.) +(\d+)", listed, re.MULTILINE)
-    assert found == [("openai/a", "2"), ("openai/b", "1")]
-    assert "Delete 2 replies of openai/a?" in call("cache", "--clear", "openai/a").output
-    assert call("cache").output == listed
-    assert "openai/a " not in call("cache", "--clear", "openai/a", typed="y\n").output
-    assert "openai/b" in call("cache").output
+
+    def listed():
+        return dict(re.findall(r"^(openai/.) +(\d+)", printed("cache"), re.MULTILINE))
+
+    clear = ("cache", "--clear", "openai/a")
+    assert "Delete 2 replies of openai/a?" in printed(*clear)
+    assert listed() == {"openai/a": "2", "openai/b": "1"}
+    assert "openai/a " not in printed(*clear, typed="y\n")
+    assert listed() == {"openai/b": "1"}
 
 
 def test_figures_exports_and_comparisons_are_written_where_they_say(folder):
-    done = call("figures", folder, "--only", "errors")
     made = [str(folder / "paper" / f"errors.{kind}") for kind in ("pdf", "svg", "png", "txt")]
-    assert done.output.split() == made
-    done = call("export", folder, "--to", "csv")
-    assert done.output.strip() == str(folder / "export" / "csv" / "records.csv")
-    done = call("compare", folder, "--models", "alpha,beta", "--out", folder / "x")
+    assert printed("figures", folder, "--only", "errors").split() == made
+    exported = printed("export", folder, "--to", "csv").strip()
+    assert exported == str(folder / "export" / "csv" / "records.csv")
+    compared = printed("compare", folder, "--models", "alpha,beta", "--out", folder / "x")
     # Five base scenes are too few for five comparisons.
-    assert "cannot tell" in done.output
+    assert "cannot tell" in compared
     assert (folder / "x" / "comparison.tex").exists()

@@ -7,14 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from phyblock.config.models import (
-    ModelConfig,
-    SamplingSpec,
-    host_of,
-    is_address,
-    load_models,
-    resolve_models,
-)
+from phyblock.config import models as config
+from phyblock.config.models import host_of, is_address, load_models
 from phyblock.errors import SpecError
 from phyblock.models.client import server_address
 from phyblock.registry import baseline_names
@@ -48,7 +42,7 @@ m:
 """
     models = load(tmp_path, text)
     assert list(models) == ["gpt-4o", "on", "1e-3", "old", "m"]
-    assert models["gpt-4o"] == ModelConfig(name="gpt-4o", id="openai/gpt-4o-2024-08-06")
+    assert models["gpt-4o"] == config.ModelConfig(name="gpt-4o", id="openai/gpt-4o-2024-08-06")
     assert models["old"].recording == tmp_path / "replies" / "old"
     assert models["m"].addresses == ("http://h:1/v1", "http://h:2/v1")
     assert load(tmp_path, "# none yet\n") == {}
@@ -57,7 +51,7 @@ m:
 
 
 def test_a_parameter_left_out_is_the_suites_and_null_is_not_sent(tmp_path):
-    defaults = SamplingSpec(temperature=0.5, top_p=0.9, max_tokens=100).model_dump()
+    defaults = config.SamplingSpec(temperature=0.5, top_p=0.9, max_tokens=100).model_dump()
     models = load(tmp_path, "a: {id: x/y, temperature: null, max_tokens: 7}\nb: x/y\n")
     assert models["a"].with_defaults(defaults).params == {"top_p": 0.9, "max_tokens": 7}
     assert models["b"].with_defaults(defaults).params == defaults
@@ -96,18 +90,15 @@ def test_any_models_file_is_read_or_refused(data, tmp_path_factory):
             assert json.dumps(model.identity(), allow_nan=False)
 
 
-GROUPED = "b: {id: x/b, groups: [big, all]}\na: {id: x/a, groups: [all]}\nc: x/c\n"
-
-
 def test_names_and_groups_stand_for_models_in_the_order_of_the_file(tmp_path):
-    known = load(tmp_path, GROUPED)
-    found = resolve_models(["oracle", "group:all", "a", "c", "group:big"], known, str)
+    grouped = "b: {id: x/b, groups: [big, all]}\na: {id: x/a, groups: [all]}\nc: x/c\n"
+    known, resolve = load(tmp_path, grouped), config.resolve_models
+    found = resolve(["oracle", "group:all", "a", "c", "group:big"], known, str)
     assert list(found) == ["oracle", "b", "a", "c"]
-    assert found["a"] is known["a"]
-    assert [found["oracle"].kind, found["oracle"].id] == ["baseline", ""]
-    assert list(resolve_models(baseline_names(), {}, str)) == list(baseline_names())
+    assert (found["a"], found["oracle"].kind, found["oracle"].id) == (known["a"], "baseline", "")
+    assert list(resolve(baseline_names(), {}, str)) == list(baseline_names())
     with pytest.raises(SpecError) as caught:
-        resolve_models(["group:al", "c", "orcale", "human:x"], known, str)
+        resolve(["group:al", "c", "orcale", "human:x"], known, str)
     assert [(p.where, p.message, p.hint) for p in caught.value.problems] == [
         ("0", "is not a group of the models file", "did you mean group:all?"),
         ("2", "is neither in the models file nor a built-in baseline", "did you mean oracle?"),

@@ -102,19 +102,16 @@ def test_overrides_equal_editing_the_file(folder, raw, changes):
 def test_paths_start_at_the_file_or_for_overrides_at_the_working_directory(folder, monkeypatch):
     monkeypatch.setenv("PHYBLOCK_TEST_ROOT", str(folder))
     monkeypatch.setenv("HOME", str(folder))
-    official = "dataset.format=official"
-    for path in ("$PHYBLOCK_TEST_ROOT/official", "${PHYBLOCK_TEST_ROOT}/official", "~/official"):
-        suite = load(folder, HEAD, official, f"dataset.path={path}")
+    monkeypatch.chdir(folder / "official")
+    named = ("$PHYBLOCK_TEST_ROOT/official", "${PHYBLOCK_TEST_ROOT}/official", "~/official")
+    for path in (*named, "../official"):
+        suite = load(folder, HEAD, "dataset.format=official", f"dataset.path={path}")
         assert suite.files.dataset == folder / "official"
     text = "dataset: {format: official, path: ./official}\nprompt: brief.j2\n"
     suite = load(folder, HEAD + text)
     assert suite.files.dataset == folder / "official"
     assert suite.template("full_planning") == folder / "brief.j2"
     assert suite.where("dataset", "path") == f"{folder / 's.yaml'}:3:35"
-    monkeypatch.chdir(folder / "official")
-    assert load(folder, HEAD, official, "dataset.path=../official").files.dataset == (
-        folder / "official"
-    )
     assert load(folder, HEAD).files.dataset == bundled("benchmarks", "data", "phyblock-400")
     assert load(folder, HEAD, "seeds=[1]", "seeds=[2]", "levels=[1]").seeds == (2,)
 

@@ -35,30 +35,25 @@ Keys = str | Sequence[str | int]
 """A path in a document; as a text it is dotted: `blocks.1.depend`."""
 
 
-def with_value(document: Any, path: Keys, value: object) -> Any:
-    """A copy of a document with the value at a path replaced."""
+def with_value(document: Any, path: Keys, *value: object) -> Any:
+    """A copy of a document with the value at a path replaced, or left out where there is none."""
     if not path:
-        return value
-    changed = copy.deepcopy(document)
-    holder, last = _holder(changed, path)
-    holder[last] = value
+        return value[0]
+    at, *rest = path.split(".") if isinstance(path, str) else path
+    changed = copy.copy(document)
+    key = int(at) if isinstance(document, list) else at
+    if rest:
+        changed[key] = with_value(document[key], rest, *value)
+    elif value:
+        changed[key] = value[0]
+    else:
+        del changed[key]
     return changed
 
 
 def without(document: Any, path: Keys) -> Any:
     """A copy of a document without what stands at a path."""
-    changed = copy.deepcopy(document)
-    holder, last = _holder(changed, path)
-    del holder[last]
-    return changed
-
-
-def _holder(document: Any, path: Keys) -> tuple[Any, Any]:
-    """What holds the value at a path, and its key there."""
-    *above, last = path.split(".") if isinstance(path, str) else path
-    for key in above:
-        document = document[int(key) if isinstance(document, list) else key]
-    return document, int(last) if isinstance(document, list) else last
+    return with_value(document, path)
 
 
 def write_scenes(folder: Path, *scenes: Raw) -> Path:

@@ -10,13 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
-from phyblock.data.official import (
-    match_published,
-    official_prompt,
-    read_official,
-    read_official_questions,
-    recorded_models,
-)
+from phyblock.data import official
+from phyblock.data.official import match_published, read_official, read_official_questions
 from phyblock.data.scenes import read_builtin
 from phyblock.errors import DataError
 from phyblock.results.paper import published_table
@@ -32,12 +27,8 @@ def problems_of(root):
     return caught.value.problems
 
 
-def goal_path(root):
-    return root / "data" / "SCENEs_400_Goal_Jsons" / "s1.json"
-
-
-def candidates_path(root):
-    return root / "data" / "SCENEs_400_Cand_Jsons" / "s1_16_cand_blocks.json"
+GOAL = "data/SCENEs_400_Goal_Jsons/s1.json"
+CANDIDATES = "data/SCENEs_400_Cand_Jsons/s1_16_cand_blocks.json"
 
 
 def change(path, field, value):
@@ -45,16 +36,16 @@ def change(path, field, value):
 
 
 def test_both_formats_say_the_same_and_what_only_official_files_have_is_read(tmp_path):
-    official = read_official(write_checkout(tmp_path, SCENE))
-    assert official.tasks == read_builtin(write_scenes(tmp_path, SCENE)).tasks
-    assert official.name == "official"
-    (task,) = official.tasks
+    read = read_official(write_checkout(tmp_path, SCENE))
+    assert read.tasks == read_builtin(write_scenes(tmp_path, SCENE)).tasks
+    assert read.name == "official"
+    (task,) = read.tasks
     assert (task.scene.look_at_m, task.composite, task.scene.parents) == (None, None, ("s1",))
     # A level-2 scene counts in level 1 too; declared layers are taken as they are.
     extra = {"level": 2, "combined": "080_092", "lookat_pos": [0, 0, 0.1], "blocks.1.layer": 5}
     for field, value in extra.items():
-        change(goal_path(tmp_path), field, value)
-    picture = tmp_path / "data" / "SCENEs_400_Goal_and_Cand_Imgs_resized" / "s1.png"
+        change(tmp_path / GOAL, field, value)
+    picture = tmp_path / "data/SCENEs_400_Goal_and_Cand_Imgs_resized/s1.png"
     picture.parent.mkdir()
     picture.write_bytes(b"")
     (task,) = read_official(tmp_path).tasks
@@ -65,22 +56,20 @@ def test_both_formats_say_the_same_and_what_only_official_files_have_is_read(tmp
 
 
 @pytest.mark.parametrize(
-    ("file_of", "path", "value", "field", "message"),
+    ("name", "path", "value", "field", "message"),
     [
-        (goal_path, "level", 5, "level", "out of range"),
-        (goal_path, "combined", 80, "combined", "wrong type"),
-        (goal_path, "combined", "_", "combined", "wrong form"),
-        (goal_path, "lookat_pos", [0, 0, "0"], "lookat_pos[2]", "wrong type"),
-        (goal_path, "blocks.1.depend", [9], "blocks[1].depend", "names no block"),
-        (candidates_path, "1.position", 3, "[1].position", "is wrong"),
-        (candidates_path, "1.euler", [0, 0, -90], "[2]", "looks the same as candidate 2"),
-        (candidates_path, "0.color", "blue", "candidates", "hold nothing that block 1"),
+        (GOAL, "level", 5, "level", "out of range"),
+        (GOAL, "combined", 80, "combined", "wrong type"),
+        (GOAL, "combined", "_", "combined", "wrong form"),
+        (GOAL, "lookat_pos", [0, 0, "0"], "lookat_pos[2]", "wrong type"),
+        (GOAL, "blocks.1.depend", [9], "blocks[1].depend", "names no block"),
+        (CANDIDATES, "1.position", 3, "[1].position", "is wrong"),
+        (CANDIDATES, "1.euler", [0, 0, -90], "[2]", "looks the same as candidate 2"),
+        (CANDIDATES, "0.color", "blue", "candidates", "hold nothing that block 1"),
     ],
 )
-def test_what_is_broken_is_named_with_file_and_field(
-    tmp_path, file_of, path, value, field, message
-):
-    file = file_of(write_checkout(tmp_path, SCENE))
+def test_what_is_broken_is_named_with_file_and_field(tmp_path, name, path, value, field, message):
+    file = write_checkout(tmp_path, SCENE) / name
     change(file, path, value)
     (problem,) = problems_of(tmp_path)
     assert (problem.where, problem.field) == (str(file), field)
@@ -92,62 +81,53 @@ def test_what_is_wrong_in_every_scene_is_said_at_once_and_no_scenes_are_no_check
     assert problem.where == str(tmp_path)
     assert "checkout" in problem.allowed
     write_checkout(tmp_path, SCENE, {**SCENE, "id": "s2"}, {**SCENE, "id": "s3"})
-    goals = goal_path(tmp_path).parent
-    candidates_path(tmp_path).unlink()
+    goals = (tmp_path / GOAL).parent
+    (tmp_path / CANDIDATES).unlink()
     (goals / "s2.json").write_text("{\n  oops")
     (goals / "s3.json").rename(goals / os.fsdecode(b"\xff.json"))
     (missing, syntax, name) = problems_of(tmp_path)
-    assert missing.where == str(candidates_path(tmp_path))
+    assert missing.where == str(tmp_path / CANDIDATES)
     assert "No such file" in missing.message
     assert syntax.where.endswith("s2.json:2:3")
     assert "not a name" in name.message
 
 
-def record(root, model, scene, raw):
-    folder = root / "outputs" / model
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / f"{scene}.json").write_text(json.dumps(raw), encoding="utf-8")
-
-
 def test_recordings_are_folders_and_the_prompt_is_what_most_of_them_carry(tmp_path):
+    def record(model, **raw):
+        (tmp_path / "outputs" / model).mkdir()
+        (tmp_path / "outputs" / model / "000.json").write_text(json.dumps(raw))
+
     (tmp_path / "outputs" / "empty").mkdir(parents=True)
     with pytest.raises(DataError, match="holds no recorded replies"):
-        recorded_models(tmp_path)
-    record(tmp_path, "plain", "000", {"choices": []})
+        official.recorded_models(tmp_path)
+    record("plain", choices=[])
     with pytest.raises(DataError, match="no recording carries the official prompt"):
-        official_prompt(tmp_path)
-    record(tmp_path, "b", "000", {"instruction": "<|image_pad|><|image_pad|>Build it."})
-    record(tmp_path, "a", "000", {"instruction": "<IMG_CONTEXT><IMG_CONTEXT>Build it."})
-    record(tmp_path, "c", "000", {"instruction": "<image>\n<image>Build this."})
-    assert official_prompt(tmp_path) == "Build it."
-    assert list(recorded_models(tmp_path)) == ["a", "b", "c", "plain"]
-    record(tmp_path, "d", "000", {"instruction": "Build this."})
+        official.official_prompt(tmp_path)
+    record("b", instruction="<|image_pad|><|image_pad|>Build it.")
+    record("a", instruction="<IMG_CONTEXT><IMG_CONTEXT>Build it.")
+    record("c", instruction="<image>\n<image>Build this.")
+    assert official.official_prompt(tmp_path) == "Build it."
+    assert list(official.recorded_models(tmp_path)) == ["a", "b", "c", "plain"]
+    record("d", instruction="Build this.")
     with pytest.raises(DataError, match="different prompts"):
-        official_prompt(tmp_path)
+        official.official_prompt(tmp_path)
 
 
 def test_the_official_scenes(official_checkout):
-    tasks = read_official(official_checkout).tasks
-    assert [task.scene.id for task in tasks] == [f"{i:03}" for i in range(400)]
-    assert Counter(task.scene.levels for task in tasks) == {(1, 2): 123, (3,): 158, (4,): 119}
-    base = {task.scene.id for task in tasks if task.scene.parents == (task.scene.id,)}
+    scenes = [task.scene for task in read_official(official_checkout).tasks]
+    assert [scene.id for scene in scenes] == [f"{i:03}" for i in range(400)]
+    assert Counter(scene.levels for scene in scenes) == {(1, 2): 123, (3,): 158, (4,): 119}
+    base = {scene.id for scene in scenes if scene.parents == (scene.id,)}
     assert len(base) == 150
-    for task in tasks:
-        assert base.issuperset(task.scene.parents)
-        assert len(task.scene.parents) == (1 if task.scene.id in base else 2)
+    for scene in scenes:
+        assert base.issuperset(scene.parents)
+        assert len(scene.parents) == (1 if scene.id in base else 2)
 
 
 COLOR = {"scene_id": "t1", "question": "What color is on top?", "answer": "B"}
 COLOR["options"] = ["red", "blue", "green", "yellow"]
 NEXT = {"scene_id": "t2", "question": "What comes next?", "answer": "<img3>"}
 NEXT["options"] = [f"<img{number}>" for number in range(1, 5)]
-
-
-def draw(folder, *names):
-    for name in names:
-        path = folder / "images" / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        Image.new("RGB", (8, 8), "red").save(path)
 
 
 def test_texts_pictures_and_orders_are_read(tmp_path, towers):
@@ -157,20 +137,25 @@ def test_texts_pictures_and_orders_are_read(tmp_path, towers):
         "Ordering.json": [{**NEXT, "answer": "CABD"}],
     }.items():
         (tmp_path / name).write_text(json.dumps(content))
-    draw(tmp_path, *(f"pd-001/img{i}.png" for i in range(1, 5)), "t1.png")
-    draw(tmp_path, *(f"or-001/img{i}.jpg" for i in range(1, 5)))
-    found = {task.key: task for task in read_official_questions(tmp_path, towers).tasks}
-    assert {name: task.question.subtask for name, task in found.items()} == {
-        "pd-001": "PD", "or-001": "OR", "co-001": "CO", "mine": "CO"
-    }  # fmt: skip
-    assert found["co-001"].question.answer_letters == "B" == found["mine"].question.answer_letters
-    assert found["co-001"].files == {"scene": tmp_path / "images" / "t1.png"}
-    assert found["co-001"].question.pictures == ()
-    assert found["pd-001"].question.answer_letters == "C"
-    assert list(found["pd-001"].files) == list("ABCD")
-    assert [p.label for p in found["pd-001"].question.pictures] == ["scene"]
-    assert found["or-001"].question.answer == (2, 0, 1, 3)
-    assert found["or-001"].question.pictures == ()
+    several = ("pd-001/img{}.png", "or-001/img{}.jpg")
+    for name in ("t1.png", *(one.format(i) for one in several for i in range(1, 5))):
+        path = tmp_path / "images" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        Image.new("RGB", (8, 8), "red").save(path)
+    tasks = read_official_questions(tmp_path, towers).tasks
+    labels = [[picture.label for picture in task.question.pictures] for task in tasks]
+    found = {
+        task.key: (task.question.subtask, task.question.answer_letters, [*task.files], labels[n])
+        for n, task in enumerate(tasks)
+    }
+    assert found == {
+        "co-001": ("CO", "B", ["scene"], []),
+        "mine": ("CO", "B", ["scene"], []),
+        "or-001": ("OR", "CABD", [*"ABCD"], []),
+        "pd-001": ("PD", "C", [*"ABCD"], ["scene"]),
+    }
+    files = {task.key: task.files for task in tasks}
+    assert files["mine"] == {"scene": tmp_path / "images" / "t1.png"}
 
 
 FAULTS = [
@@ -229,14 +214,12 @@ OTHERS = [
 ROWS = [*dict.fromkeys([*published_table(1)["model"], *published_table(2)["model"]])]
 
 
-@pytest.mark.parametrize(("name", "published"), [*SPELLINGS.items(), *zip(ROWS, ROWS, strict=True)])
-def test_known_spellings(name, published):
+KNOWN = SPELLINGS | dict(zip(ROWS, ROWS, strict=True)) | dict.fromkeys(OTHERS)
+
+
+@pytest.mark.parametrize(("name", "published"), KNOWN.items())
+def test_known_spellings_are_those_of_published_models_and_others_of_none(name, published):
     assert match_published(name) == published
-
-
-@pytest.mark.parametrize("name", OTHERS)
-def test_other_models_are_not_taken_for_published_ones(name):
-    assert match_published(name) is None
 
 
 names = st.sampled_from([*ROWS, *SPELLINGS])

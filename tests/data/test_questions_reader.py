@@ -7,11 +7,11 @@ from hypothesis import given, settings
 
 from phyblock.data.questions import read_questions
 from phyblock.data.scenes import read_builtin
-from phyblock.domain.question import Mark
-from phyblock.domain.scene import Block
+from phyblock.domain.question import Mark, QuestionPicture
 from phyblock.errors import DataError
 from tests.data.broken import sound_scene, with_value, without, write_scenes
 from tests.fuzz.strategies import QUESTIONS, sound_question
+from tests.sim.structures import block
 from tests.workspace import problem_of, tower, write_lines
 
 QUESTION = sound_question("s1") | {"id": "co-001"}
@@ -44,14 +44,12 @@ def test_a_picture_is_the_scene_but_for_what_its_recipe_says(tmp_path, scenes):
     asked["question"] = "How many \U0001f9f1?"
     (task,) = read_questions(write(tmp_path / "q", asked), scenes).tasks
     assert task.question.text == asked["question"]
-    (picture,) = task.question.pictures
-    assert picture.background == "lawn"
-    assert picture.blocks == (
-        Block(2, "cuboid2", "green", (0, 0, 0.1), (0, 0, 45), (1,), 2),
-        Block(9, "cube", "red", (0.2, 0, 0.025), (0, 0, 0), (), 1),
+    blocks = (
+        block(2, "cuboid2", (0, 0, 0.1), (0, 0, 45), "green", (1,)),
+        block(9, "cube", (0.2, 0, 0.025), (0, 0, 0)),
     )
-    assert picture.marks == (Mark("A", (0, 0, 0.1)),)
-    assert picture.framed == task.scene.blocks
+    shown = {"marks": (Mark("A", (0, 0, 0.1)),), "framed": task.scene.blocks, "background": "lawn"}
+    assert task.question.pictures == (QuestionPicture("scene", blocks, (90, 30), **shown),)
 
 
 POSE = {"position": [0, 0, 0], "euler": [0, 0, 0]}
@@ -99,20 +97,18 @@ def test_what_is_wrong_is_named_with_its_line(tmp_path, scenes, at, value, field
     assert (problem.field, problem.found) == (field, found)
 
 
-def test_a_missing_field_and_a_number_that_is_used_twice_are_told(tmp_path, scenes):
-    for field in ("id", "subtask", "scene_id", "question", "options", "answer"):
-        with pytest.raises(DataError, match=rf"questions.jsonl:1: {field}: is missing"):
-            read_questions(write(tmp_path / "q", without(QUESTION, field)), scenes)
-    folder = write(tmp_path / "q", QUESTION, QUESTION | {"id": "co-002"}, QUESTION)
-    with pytest.raises(DataError, match=r"questions.jsonl:3: id: is used at .*:1 already"):
-        read_questions(folder, scenes)
-
-
-def test_an_empty_file_and_no_file_are_told(tmp_path, scenes):
-    with pytest.raises(DataError, match="holds no questions"):
-        read_questions(write(tmp_path / "q"), scenes)
+def test_what_is_missing_or_there_twice_is_told(tmp_path, scenes):
     with pytest.raises(DataError, match=r"a folder with questions\.jsonl"):
         read_questions(tmp_path, scenes)
+    twice = (QUESTION, QUESTION | {"id": "co-002"}, QUESTION)
+    fields = ("id", "subtask", "scene_id", "question", "options", "answer")
+    for lines, said in (
+        ((), "holds no questions"),
+        (twice, r"questions.jsonl:3: id: is used at .*:1 already"),
+        *(([without(QUESTION, one)], rf"questions.jsonl:1: {one}: is missing") for one in fields),
+    ):
+        with pytest.raises(DataError, match=said):
+            read_questions(write(tmp_path / "q", *lines), scenes)
 
 
 OTHERS = {

@@ -19,35 +19,26 @@ from phyblock.records import files
 from phyblock.records.files import RecordLines, known_records, newest_starts
 from phyblock.records.record import Reply, Usage, validated
 from phyblock.results.load import load_run
-from tests.data.broken import (
-    DAMAGED,
-    lines_before,
-    plan_record,
-    record_with,
-    sound_scene,
-    with_value,
-)
-from tests.documents import ROOT
+from tests.data import broken
+from tests.data.broken import DAMAGED, lines_before, sound_scene
+from tests.documents import SCHEMAS
 from tests.fuzz.strategies import sound_question
 from tests.shipped import DATA, TASKS, built_in_questions
 from tests.web.factory import JSON, manifest
 from tests.workspace import problem_of
 
-SCENES = Path("phyblock-400", "scenes.jsonl")
-QUESTIONS = Path("phyblock-vqa", "questions.jsonl")
-
-
-def lines_of(path):
-    return (DATA / path).read_text(encoding="utf-8").splitlines()
+SCENES, QUESTIONS = (
+    (DATA / name).read_text(encoding="utf-8").splitlines()
+    for name in ("phyblock-400/scenes.jsonl", "phyblock-vqa/questions.jsonl")
+)
 
 
 def test_shipped_scenes_and_questions_are_written_byte_for_byte():
-    written = [StoredScene.of(task.scene, task.candidates).as_json() for task in TASKS]
-    assert written == lines_of(SCENES)
+    assert [StoredScene.of(task.scene, task.candidates).as_json() for task in TASKS] == SCENES
     originals = {task.key: task.scene for task in TASKS}
     asked = (task.question for task in built_in_questions().tasks)
     written = [StoredQuestion.of(one, originals[one.scene.id]).as_json() for one in asked]
-    assert written == lines_of(QUESTIONS)
+    assert written == QUESTIONS
 
 
 @pytest.mark.parametrize(
@@ -61,23 +52,18 @@ def test_a_line_may_say_its_version_and_none_is_from_the_future(kind, raw):
 
 
 def schema(name):
-    text = (ROOT / "benchmarks" / "schemas" / f"{name}.schema.json").read_text(encoding="utf-8")
-    jsonschema.Draft202012Validator.check_schema(json.loads(text))
-    return jsonschema.Draft202012Validator(json.loads(text))
+    return jsonschema.Draft202012Validator(
+        json.loads((SCHEMAS / f"{name}.schema.json").read_text(encoding="utf-8"))
+    )
 
 
-@pytest.mark.parametrize(
-    ("name", "lines"),
-    [
-        ("scene", lines_of(SCENES)[::25]),
-        ("question", lines_of(QUESTIONS)[::25]),
-        ("record", lines_before()),
-    ],
-    ids=["scene", "question", "record"],
-)
-def test_the_schemas_take_what_is_shipped(name, lines):
+SHIPPED = {"scene": SCENES[::25], "question": QUESTIONS[::25], "record": lines_before()}
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_the_schemas_take_what_is_shipped(name):
     found = schema(name)
-    for line in lines:
+    for line in SHIPPED[name]:
         found.validate(json.loads(line))
 
 
@@ -98,11 +84,11 @@ BROKEN = {
 
 @pytest.mark.parametrize(("name", "raw", "at", "value"), BROKEN.values(), ids=BROKEN)
 def test_the_schemas_refuse_what_the_models_refuse(name, raw, at, value):
-    broken = with_value(raw, at, value)
+    changed = broken.with_value(raw, at, value)
     assert schema(name).is_valid(raw)
-    assert not schema(name).is_valid(broken)
+    assert not schema(name).is_valid(changed)
     with pytest.raises(DataError):
-        validated(StoredScene if name == "scene" else StoredQuestion, broken, "here")
+        validated(StoredScene if name == "scene" else StoredQuestion, changed, "here")
 
 
 numbers = st.none() | st.integers(-(10**40), 10**40)
@@ -129,8 +115,8 @@ def test_lines_of_the_first_version_are_written_again_byte_for_byte(line):
 
 @given(st.dictionaries(st.text("xyz", min_size=1, max_size=3), JSON, max_size=3))
 def test_what_no_model_declares_is_kept(more):
-    record = plan_record()
-    line = json.dumps(record | more, ensure_ascii=False, separators=(",", ":")).encode()
+    record = broken.plan_record() | more
+    line = json.dumps(record, ensure_ascii=False, separators=(",", ":")).encode()
     assert whole(line) == line
 
 
@@ -142,8 +128,8 @@ def test_a_damaged_line_is_named_with_its_field(tmp_path, name):
     assert problem.where.startswith(f"{tmp_path / 'records.jsonl'}:2")
     assert problem.message.startswith("is not a record")
     assert problem.hint
-    assert problem.field == field or not field
     assert says in str(problem)
+    assert problem.field == field or not field
 
 
 @given(st.binary(max_size=40), st.integers(0, 2469), st.integers(0, 40))
@@ -160,9 +146,8 @@ def test_any_bytes_are_read_or_refused(tmp_path_factory, noise, start, length):
 
 @pytest.mark.parametrize("name", ["deep", "many-digits", "word", "nan"])
 def test_only_what_a_kill_cut_short_is_passed_over(tmp_path, name):
-    folder = folder_with(tmp_path, lines_before()[0])
-    with (folder / "records.jsonl").open("ab") as file:
-        file.write(DAMAGED[name][0])
+    folder = folder_with(tmp_path, lines_before()[0], DAMAGED[name][0])
+    os.truncate(folder / "records.jsonl", (folder / "records.jsonl").stat().st_size - 1)
     with pytest.raises(StoreError, match=r"records\.jsonl:2"):
         list(RecordLines(folder))
 
@@ -184,7 +169,7 @@ def test_what_is_no_file_is_refused(tmp_path, make):
 
 
 def test_a_sample_is_taken_from_its_last_line(tmp_path):
-    first, last = lines_before()[0], record_with("reply.text", "later")
+    first, last = lines_before()[0], broken.record_with("reply.text", "later")
     records = RecordLines(folder_with(tmp_path, first, last))
     starts = newest_starts(records)
     assert list(starts.values()) == [len(first) + 1]

@@ -21,43 +21,38 @@ def test_what_no_run_writes_is_refused_in_words(tmp_path, name, field):
         read_manifest(tmp_path)
 
 
-def facts():
-    """The manifest of the run that `plan_record` is of."""
-    return Manifest.model_validate({"identity": IDENTITY})
+FACTS = Manifest.model_validate({"identity": IDENTITY})
+"""The manifest of the run that `plan_record` is of."""
 
 
 def renamed(**changes):
-    record = {**plan_record(), **changes}
-    parts = (record["track"], record["model"], record["key"], f"s{record['seed']}")
-    return {**record, "sample": "/".join(parts)}
+    record = plan_record() | changes
+    return record | {"sample": "{track}/{model}/{key}/s{seed}".format(**record)}
 
 
 @pytest.mark.parametrize(
     ("record", "field"),
     [
         (plan_record(), None),
-        ({**plan_record(), "run": IDENTITY[:16]}, None),
-        ({**plan_record(), "run": "0" * 16}, "run"),
+        (plan_record() | {"run": IDENTITY[:16]}, None),
+        (plan_record() | {"run": "0" * 16}, "run"),
         (renamed(model="oracle"), "sample"),
         (renamed(seed=2), "sample"),
         (renamed(key="another"), "sample"),
         (renamed(track="pose_planning") | {"track": "full_planning"}, "sample"),
-        ({**plan_record(), "seed": 1}, "sample"),
-        ({**plan_record(), "model": "oracle"}, "sample"),
+        (plan_record() | {"seed": 1}, "sample"),
+        (plan_record() | {"model": "oracle"}, "sample"),
     ],
 )
-def test_a_foreign_record_is_known_by_what_differs(record, field):
-    validation = Validation(facts(), {plan_record()["sample"]})
+def test_a_foreign_record_or_call_is_known_by_what_differs(record, field):
+    validation = Validation(FACTS, {plan_record()["sample"]})
     problem = validation.problem("records.jsonl:7", known_records().validate_python(record))
     assert (problem and problem.field) == field
     assert problem is None or (problem.where == "records.jsonl:7" and problem.hint)
-
-
-def test_a_call_of_another_run_is_foreign():
-    call = Call(call=0, model="m", sample="s", key="k", run=facts().run)
-    assert Validation(facts(), {"t"}).problem("calls.jsonl:1", call) is None
-    other = call.model_copy(update={"run": "0" * 16})
-    assert Validation(facts(), {"s"}).problem("calls.jsonl:1", other).field == "run"
+    for run, wanted in ((FACTS.run, None), ("0" * 16, "run")):
+        call = Call(call=0, model="m", sample="s", key="k", run=run)
+        problem = validation.problem("calls.jsonl:1", call)
+        assert (problem and problem.field) == wanted
 
 
 @pytest.fixture(scope="module")
