@@ -44,9 +44,8 @@ from phyblock.data.scenes import SCENES_FILE
 from phyblock.domain.scene import AssemblyTask
 from phyblock.errors import Problem, SpecError
 from phyblock.making.checks import Finding, verify_scene
-from phyblock.making.scenes.candidates import make_candidates
-from phyblock.making.scenes.production import Production, builtin_forms, shares, split_tasks
-from phyblock.making.scenes.sketch import PALETTES, Palette
+from phyblock.making.scenes import production
+from phyblock.making.scenes.sketch import Palette
 from phyblock.models.request import Request, wire_messages
 from phyblock.records.record import Record, Reply
 from phyblock.registry import added_measures, known_track
@@ -479,7 +478,7 @@ def tasks(
         raise SpecError(Problem("tasks", message, "first", str(first), hint="use a slice"))
     dataset = None
     if split != "test":
-        stream = partial(split_tasks, split, seed, levels=suite.levels)
+        stream = partial(production.split_tasks, split, seed, levels=suite.levels)
         if limit is None:
             return Tasks(suite, split, stream, {}, first)
         dataset = Dataset(split, Path(split), _distinct(stream(), limit))
@@ -532,18 +531,16 @@ def generate(
 
     All stand, and none has the structure of a built-in one. Raises DataError if there are too few.
     """
-    kinds = PALETTES[palette]
+    excluded = production.builtin_forms()
     with open_workers() as workers:
-        made = Production(seed, palette, workers, builtin_forms()).scenes(shares(count, levels))
-        return {
-            scene.id: AssemblyTask(scene, make_candidates(scene, palette=kinds)) for scene in made
-        }
+        made = production.Production(seed, palette, workers, excluded)
+        return {task.key: task for task in made.tasks(production.shares(count, levels))}
 
 
 @checked
 def verify(scene: InstanceOf[AssemblyTask]) -> tuple[Finding, ...]:
     """Return the findings about a scene and its candidates, by geometry and physics."""
-    return verify_scene((scene.scene, scene.candidates))
+    return verify_scene(scene)
 
 
 @checked

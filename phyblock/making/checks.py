@@ -7,22 +7,13 @@ from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import NamedTuple
 
-from phyblock.domain.blocks import KIT_PALETTE, orientation_class
-from phyblock.domain.scene import MAX_CANDIDATES, CandidateSet, Kind, Scene, fingerprint
+from phyblock.domain.blocks import orientation_class
+from phyblock.domain.scene import AssemblyTask, CandidateSet, Scene, fingerprint
 from phyblock.errors import Problem
 from phyblock.making.scenes.sketch import POSES
+from phyblock.sim import dynamics
 from phyblock.sim.contact import FIT_TOLERANCE_M, GROUND, find_gaps, find_overlaps, support_graph
-from phyblock.sim.dynamics import (
-    DEFAULT_TRIAL,
-    MOST_PROVEN,
-    Stability,
-    Trial,
-    check,
-    check_steps,
-    groups,
-    is_proven,
-    stands,
-)
+from phyblock.sim.dynamics import Stability, Trial, check
 from phyblock.sim.pictures import LEAST_SHOWN, PictureStyle, hidden_blocks, visible_shares
 
 
@@ -64,9 +55,8 @@ class SceneFacts:
 
     scene: Scene
     candidates: CandidateSet | None = None
-    palette: tuple[Kind, ...] = KIT_PALETTE
     fit_m: float = FIT_TOLERANCE_M
-    trial: Trial = DEFAULT_TRIAL
+    trial: Trial = dynamics.DEFAULT_TRIAL
     quiet_s: float | None = None
 
     @cached_property
@@ -96,14 +86,6 @@ def _size(facts: SceneFacts) -> Iterator[Finding]:
         if layers > most_layers:
             allowed = f"at most {most_layers} at level {level}"
             yield _fault("too high", field="layers", found=layers, allowed=allowed)
-
-
-def _palette(facts: SceneFacts) -> Iterator[Finding]:
-    """Blocks whose pair of type and color is not in the palette."""
-    for i, block in enumerate(facts.scene.blocks):
-        if block.kind not in facts.palette:
-            kind = " ".join(block.kind)
-            yield _fault("not in the palette", block.order, field=f"blocks[{i}]", found=kind)
 
 
 def _layer(facts: SceneFacts) -> Iterator[Finding]:
@@ -171,7 +153,7 @@ def _dependencies(facts: SceneFacts, is_declared: bool) -> Iterator[Finding]:
 def _unstable_step(facts: SceneFacts) -> Iterator[Finding]:
     """Steps of the stored order, before the last one, after which something falls."""
     blocks, first = facts.scene.blocks, replace(facts.trial, physics=facts.trial.physics[:1])
-    for count, step in enumerate(check_steps(blocks[:-1], first), 1):
+    for count, step in enumerate(dynamics.check_steps(blocks[:-1], first), 1):
         if not step.stable:
             when = f"at step {count}, once block {blocks[count - 1].order} is placed"
             yield _fall(step, when, first)
@@ -193,13 +175,9 @@ def _fall(shown: Stability, when: str, trial: Trial) -> Finding:
 
 
 def _candidates(facts: SceneFacts) -> Iterator[Finding]:
-    """Too many candidates, and blocks without a candidate."""
-    if facts.candidates is None:
-        return
-    if (count := len(facts.candidates)) > MAX_CANDIDATES:
-        allowed = f"at most {MAX_CANDIDATES}"
-        yield _fault("too many candidates", field="candidates", found=count, allowed=allowed)
-    for order in facts.candidates.missing(facts.scene):
+    """Blocks without a candidate."""
+    given = facts.candidates
+    for order in () if given is None else given.missing(facts.scene):
         message = f"the candidates hold nothing that block {order} needs"
         yield _fault(message, order, field="candidates")
 
@@ -220,7 +198,6 @@ def _name(order: int) -> str:
 
 CHECKS: dict[str, Callable[[SceneFacts], Iterable[Finding]]] = {
     "size": _size,
-    "palette": _palette,
     "layer": _layer,
     "order": _order,
     "hidden": _hidden,
@@ -233,13 +210,11 @@ CHECKS: dict[str, Callable[[SceneFacts], Iterable[Finding]]] = {
     "candidates": _candidates,
     "distractor": _distractor,
 }
-"""The checks of a single scene, cheap ones first, and causes before their effects."""
-FORM = tuple(CHECKS)[:4]
+"""The checks of a scene with its candidates, cheap ones first, and causes before effects."""
+FORM = tuple(CHECKS)[:3]
 """Checks without geometry."""
-PHYSICS = tuple(CHECKS)[5:11]
+PHYSICS = tuple(CHECKS)[4:10]
 """Overlaps, floating blocks, wrong dependencies, and falls."""
-VERIFIED = tuple(name for name in CHECKS if name != "palette")
-"""Checks of a scene that was made here, with its candidates."""
 FOREIGN_CHECKS = (*PHYSICS, "layer", "order", "candidates")
 """Checks of a scene made elsewhere."""
 
@@ -251,30 +226,28 @@ def findings_of(facts: SceneFacts, names: Iterable[str]) -> Iterator[Finding]:
             yield replace(found, where=facts.scene.id, check=name)
 
 
-def is_acceptable(scene: Scene, palette: tuple[Kind, ...]) -> bool:
+def is_acceptable(scene: Scene) -> bool:
     """True if a scene could enter a set: proven to stand with margins, each block visible."""
-    facts = SceneFacts(scene, palette=palette)
-    found = findings_of(facts, (*FORM, "hidden", *PHYSICS))
+    found = findings_of(SceneFacts(scene), (*FORM, "hidden", *PHYSICS))
     return (
-        all(map(is_proven, groups(scene.blocks)))
+        all(map(dynamics.is_proven, dynamics.groups(scene.blocks)))
         # Runs simulate until all is at rest, and a tall column may sway past a limit by then.
-        and (len(scene) <= MOST_PROVEN or stands(scene.blocks))
+        and (len(scene) <= dynamics.MOST_PROVEN or dynamics.stands(scene.blocks))
         and next(found, None) is None
     )
 
 
-Task = tuple[Scene, CandidateSet | None]
-
-
-def verify_scene(task: Task) -> tuple[Finding, ...]:
+def verify_scene(task: AssemblyTask) -> tuple[Finding, ...]:
     """Return the findings about a scene and its candidate set."""
-    return tuple(findings_of(SceneFacts(*task), VERIFIED))
+    return tuple(findings_of(SceneFacts(task.scene, task.candidates), CHECKS))
 
 
-def verify_foreign(task: Task, trial: Trial = DEFAULT_TRIAL) -> tuple[Finding, ...]:
+def verify_foreign(
+    task: AssemblyTask, trial: Trial = dynamics.DEFAULT_TRIAL
+) -> tuple[Finding, ...]:
     """Return findings on a task of the official data, whose positions are rounded millimeters."""
     # 2 mm cannot be seen in a picture.
-    facts = SceneFacts(*task, fit_m=0.002, trial=trial, quiet_s=0.5)
+    facts = SceneFacts(task.scene, task.candidates, fit_m=0.002, trial=trial, quiet_s=0.5)
     return tuple(findings_of(facts, FOREIGN_CHECKS))
 
 

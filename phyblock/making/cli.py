@@ -44,21 +44,12 @@ from phyblock.files import OutFolder, bundled_sets, write_named
 from phyblock.making import checks, files
 from phyblock.making.questions.guesses import Probe, audit_questions
 from phyblock.making.questions.production import MAKERS, make_questions, problem_of
-from phyblock.making.scenes.candidates import make_candidates
 from phyblock.making.scenes.completing import complete, read_given
-from phyblock.making.scenes.production import Production, builtin_forms, shares
+from phyblock.making.scenes.production import Production, builtin_forms, make_candidates, shares
 from phyblock.making.scenes.sketch import PALETTES, Palette, colorless
+from phyblock.sim import pictures
 from phyblock.sim.engine import described_engine, other_engine
-from phyblock.sim.pictures import (
-    RENDER_VERSION,
-    PictureStyle,
-    assembly_gif,
-    candidates_png,
-    composite_png,
-    goal_png,
-    to_png,
-    visible_shares,
-)
+from phyblock.sim.pictures import PictureStyle
 from phyblock.sim.question_pictures import question_png
 from phyblock.sim.raster import VIEWS
 from phyblock.text import counted, did_you_mean, hex_digest
@@ -202,11 +193,8 @@ def generate_scenes(
     work = f"{command}\n{hex_digest(b''.join(sorted(excluded)))}"
     with _making(out, files.SCENE_FILES, work, **workers_options) as (workers, shards):
         production = Production(seed, palette, workers, excluded)
-        produced = production.scenes(shares(count, [int(level[0]) for level in levels]))
-        tasks = [
-            (scene, make_candidates(scene, palette=PALETTES[palette]))
-            for scene in tracked(produced, count, "Making")
-        ]
+        produced = production.tasks(shares(count, [int(level[0]) for level in levels]))
+        tasks = list(tracked(produced, count, "Making"))
     if left_to_first(shards, out):
         return
     card = files.scene_card(out.name, tasks, command, palette, production.rejected)
@@ -278,9 +266,8 @@ def compare(first: str, second: str) -> None:
     Scenes are equal if turning, mirroring and shifting makes one the other, and nearly equal if
     then only colors differ.
     """
-    tasks, known = read_data_set(first).tasks, read_data_set(second).tasks[::-1]
+    tasks, known = read_data_set(first).tasks, read_data_set(second).tasks
     rows = []
-    # The first twin of each form in B counts.
     equal = {fingerprint(task.scene.blocks): task.key for task in known}
     nearly = {colorless(task.scene.blocks): task.key for task in known}
     for task in tasks:
@@ -297,41 +284,39 @@ def compare(first: str, second: str) -> None:
 
 
 @scenes.command("complete")
-@click.argument("data", metavar="FILE_OR_FOLDER", type=UserPath())
+@click.argument("file", type=UserPath())
 @jobs_option()
 @click.option("--out", "-o", type=UserPath(), help="Folder to write.  [default: NAME-set here]")
-def complete_set(data: Path, jobs: int, out: Path | None) -> None:
+def complete_set(file: Path, jobs: int, out: Path | None) -> None:
     """Make a data set from scenes that give type, color, position and euler of their blocks.
 
-    FILE_OR_FOLDER is YAML, JSON, or JSON with one scene per line, or a folder of such files.
-    Derives dependencies from contacts, and layers and levels from those; draws candidates unless
-    they are given. Refuses scenes whose blocks overlap, float or fall. Never overwrites its input.
+    FILE is YAML or JSON: a scene, a list, or a mapping with the list `scenes`. Derives dependencies
+    from contacts, and layers and levels from those; draws candidates unless they are given. Refuses
+    scenes whose blocks overlap, float or fall. Never overwrites its input.
     """
-    given = read_given(data)
-    folder = out or Path(f"{data.resolve().stem}-set")
+    given = read_given(file)
+    folder = out or Path(f"{file.stem}-set")
     files.check_out(folder, files.SCENE_FILES)
     done = _mapped(complete, given, jobs, "Completing")
     if problems := [problem for one in done for problem in one.problems]:
         raise DataError(problems)
-    whole = [(one.scene, one.offered) for one in done if one.scene]
-    made = [scene for scene, _ in whole]
+    made = [one.scene for one in done if one.scene]
     # Distractors are of the kit if it has all blocks of the scenes.
     kinds = {block.kind for scene in made for block in scene.blocks}
-    palette = PALETTES["kit" if kinds <= set(PALETTES["kit"]) else "full"]
+    palette: Palette = "kit" if kinds <= set(PALETTES["kit"]) else "full"
     tasks = [
-        (scene, offered or make_candidates(scene, palette=palette)) for scene, offered in whole
+        AssemblyTask(scene, one.offered or make_candidates(scene, palette=palette))
+        for scene, one in zip(made, done, strict=True)
     ]
-    command = f"phyblock scenes complete {shlex.quote(data.name)} --out {shlex.quote(folder.name)}"
+    command = f"phyblock scenes complete {shlex.quote(file.name)} --out {shlex.quote(folder.name)}"
     card = files.card("completed", name=folder.name, count=len(tasks), command=command)
     files.write_scenes(folder, tasks, card)
-    for scene, one in zip(made, done, strict=True):
-        for note in one.notes:
-            click.echo(f"note: scene {scene.id}: {note}")
+    for note in chain.from_iterable(one.notes for one in done):
+        click.echo(f"note: {note}")
     for finding in checks.check_set(made):
         click.echo(f"note: scene {finding.where}: {finding.field} {finding.message}")
     click.echo(f"{counted(len(tasks), 'scene')} completed: {shown_path(folder)}")
-    here = str(folder) if folder.is_absolute() else f"./{folder}"
-    click.echo(f"Next: phyblock run quick --set dataset.path={shlex.quote(here)}")
+    click.echo(f"Next: phyblock run quick --set dataset.path={shlex.quote(str(folder.resolve()))}")
 
 
 @scenes.command("verify")
@@ -350,11 +335,11 @@ def verify_scenes(data: str, jobs: int) -> None:
     """
     where = find_data_set(data)
     is_official = not (where / SCENES_FILE).is_file()
-    tasks = [(task.scene, task.candidates) for task in read_data_set(data).tasks]
-    names, work = (*checks.VERIFIED, "duplicate", "parents"), checks.verify_scene
+    tasks = read_data_set(data).tasks
+    names, work = (*checks.CHECKS, "duplicate", "parents"), checks.verify_scene
     if is_official:
         names, work = (*checks.FOREIGN_CHECKS, "duplicate"), checks.verify_foreign
-    found = [one for one in checks.check_set([scene for scene, _ in tasks]) if one.check in names]
+    found = [one for one in checks.check_set([task.scene for task in tasks]) if one.check in names]
     found += chain.from_iterable(_mapped(work, tasks, jobs, "Verifying"))
     failed = Counter(check for _, check in {(one.where, one.check) for one in found})
     rows = [((check,), failed[check], len(tasks)) for check in names]
@@ -387,7 +372,7 @@ def show_scene(data: str, scene: str) -> None:
     console.print(heading, soft_wrap=True)
     numbers = (f"{name} {measure(task):.3g}" for name, measure in DIFFICULTY.items())
     console.print(f"difficulty: {' · '.join(numbers)}", soft_wrap=True)
-    seen = visible_shares(shown, PictureStyle())
+    seen = pictures.visible_shares(shown, PictureStyle())
     blocks = [
         (
             *(str(block.order), block.type, block.color),
@@ -446,14 +431,14 @@ def render(
     for task, seen, floor in product(tasks, views, floors):
         style = PictureStyle(512, floor, *VIEWS[seen])
         stem = f"{task.scene.id}-{seen}-{floor}"
-        drawings[f"{stem}.png"] = partial(goal_png, task.scene, style)
+        drawings[f"{stem}.png"] = partial(pictures.goal_png, task.scene, style)
         if composite:
             drawings[f"{stem}-composite.png"] = partial(_composite, task, style)
         if gif:
-            drawings[f"{stem}.gif"] = partial(assembly_gif, task.scene, style)
+            drawings[f"{stem}.gif"] = partial(pictures.assembly_gif, task.scene, style)
     OutFolder(out).check(drawings)
-    work = f"scenes render: {read.sha256} {hex_digest(repr([RENDER_VERSION, *drawings]))}\n"
-    shards = open_shards(shard, out, work)
+    digest = hex_digest(repr([pictures.RENDER_VERSION, *drawings]))
+    shards = open_shards(shard, out, f"scenes render: {read.sha256} {digest}\n")
     with open_workers(**pool, shards=shards) as workers:
         _draw(out, drawings, workers, shards)
     if not left_to_first(shards, out):
@@ -461,7 +446,8 @@ def render(
 
 
 def _composite(task: AssemblyTask, style: PictureStyle) -> bytes:
-    return composite_png(goal_png(task.scene, style), candidates_png(task.candidates, style))
+    goal = pictures.goal_png(task.scene, style)
+    return pictures.composite_png(goal, pictures.candidates_png(task.candidates, style))
 
 
 def _draw(
@@ -503,7 +489,7 @@ def _read(path: str, data: str) -> QuestionSet:
     metavar="N",
     help="Questions per subtask; by default 150, and 100 for PD.",
 )
-@click.option("--pictures", is_flag=True, help="Also draw all pictures into DIR/pictures.")
+@click.option("--pictures", "is_drawn", is_flag=True, help="Also draw them into DIR/pictures.")
 @_seed
 @worker_options()
 @_out
@@ -511,7 +497,7 @@ def generate_questions(
     data: str,
     subtasks: tuple[Subtask, ...],
     per_subtask: int | None,
-    pictures: bool,
+    is_drawn: bool,
     seed: int,
     out: Path,
     **workers_options: Any,
@@ -526,7 +512,7 @@ def generate_questions(
         command += f" --subtasks {','.join(subtasks)}"
     if per_subtask is not None:
         command += f" --per-subtask {per_subtask}"
-    if pictures:
+    if is_drawn:
         command += " --pictures"
     wanted = {subtask: per_subtask or MAKERS[subtask].count for subtask in subtasks}
     read = read_data_set(data)
@@ -538,13 +524,13 @@ def generate_questions(
             f"{files.PICTURES}/{question.id}-{one.label}.png": partial(
                 question_png, one, PictureStyle()
             )
-            for question in (made if pictures else ())
+            for question in (made if is_drawn else ())
             for one in question.pictures
         }
         _draw(out, drawings, workers, shards)
     if left_to_first(shards, out):
         return
-    card = files.question_card(out.name, read.name, made, command, has_pictures=pictures)
+    card = files.question_card(out.name, read.name, made, command, has_pictures=is_drawn)
     files.write_questions(out, made, originals, card, list(drawings))
     outcome = f"{counted(len(made), 'question')} in {counted(len(subtasks), 'subtask')}"
     each_s = sum(os.times()[:4]) / len(made)
@@ -609,7 +595,7 @@ def show_question(question: str, path: str, data: str, out: Path | None) -> None
         images = [np.asarray(Image.open(png)) for png in pngs]
         gap = np.full_like(images[0][:, :_GAP_PX], 255)
         sheet = np.hstack([part for image in images for part in (gap, image)][1:])
-        write_named(out, to_png(Image.fromarray(sheet)))
+        write_named(out, pictures.to_png(Image.fromarray(sheet)))
         console.print(f"pictures: {shown_path(out)}", soft_wrap=True)
 
 

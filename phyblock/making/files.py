@@ -12,22 +12,14 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from pydantic import Field, TypeAdapter
 
 import phyblock
+from phyblock import files
 from phyblock.data.base import VERSION_FILE, read_data
 from phyblock.data.lookup import find_data_set
 from phyblock.data.questions import StoredQuestion
 from phyblock.data.scenes import SCENES_FILE, StoredScene
 from phyblock.domain.question import LETTERS, SUBTASK_NAMES, SUBTASKS, Question
-from phyblock.domain.scene import CandidateSet, Scene
+from phyblock.domain.scene import AssemblyTask, Scene
 from phyblock.errors import DataError, Problem
-from phyblock.files import (
-    atomic_write,
-    bundled_sets,
-    check_free,
-    digest_of_file,
-    make_folder,
-    read_text,
-    writing,
-)
 from phyblock.making.checks import LEVEL_LIMITS
 from phyblock.making.scenes.sketch import PALETTES, Palette
 from phyblock.records.record import Line, decode
@@ -44,18 +36,17 @@ SCENE_SET_VERSION = 5
 """Increased whenever the same seed makes other scenes or candidate sets."""
 QUESTION_SET_VERSION = 12
 """Increased whenever questions with the same name change, so that results are never mixed."""
-_Tasks = Sequence[tuple[Scene, CandidateSet]]
 
 
 def check_out(folder: Path, names: Sequence[str]) -> None:
     """Raise StoreError if the folder already holds files of these names."""
-    check_free([folder / name for name in (*names, SUMS_FILE)], "give another --out")
+    files.check_free([folder / name for name in (*names, SUMS_FILE)], "give another --out")
 
 
-def write_scenes(folder: Path, tasks: _Tasks, card: str) -> None:
+def write_scenes(folder: Path, tasks: Sequence[AssemblyTask], card: str) -> None:
     """Write scenes with their candidate sets, sorted by id. Raises StoreError if that fails."""
-    by_id = sorted(tasks, key=lambda task: task[0].id)
-    lines = (StoredScene.of(scene, candidates).as_json() for scene, candidates in by_id)
+    by_id = sorted(tasks, key=lambda task: task.key)
+    lines = (StoredScene.of(task.scene, task.candidates).as_json() for task in by_id)
     _write(folder, SCENE_FILES, (card, "".join(f"{line}\n" for line in lines)), SCENE_SET_VERSION)
 
 
@@ -80,16 +71,16 @@ def _write(
     pictures: Iterable[str] = (),
 ) -> None:
     check_out(folder, names)
-    make_folder(folder)
-    with writing(folder):
+    files.make_folder(folder)
+    with files.writing(folder):
         for name, text in zip(names, (*texts, f"{version}\n"), strict=True):
-            atomic_write(folder / name, text)
-        atomic_write(folder / SUMS_FILE, sums_text(folder, (*names, *pictures)))
+            files.atomic_write(folder / name, text)
+        files.atomic_write(folder / SUMS_FILE, sums_text(folder, (*names, *pictures)))
 
 
 def sums_text(folder: Path, names: Iterable[str]) -> str:
     """Return checksums of files in the format of `sha256sum -c`."""
-    return "".join(f"{digest_of_file(folder / name)}  {name}\n" for name in names)
+    return "".join(f"{files.digest_of_file(folder / name)}  {name}\n" for name in names)
 
 
 def check_sums(folder: Path) -> tuple[int, tuple[Problem, ...]]:
@@ -97,11 +88,11 @@ def check_sums(folder: Path) -> tuple[int, tuple[Problem, ...]]:
     path = folder / SUMS_FILE
     if not path.is_file():
         return 1, (Problem(str(path), "is missing"),)
-    lines = read_text(path).splitlines()
+    lines = files.read_text(path).splitlines()
     wrong = []
     for line in lines:
         digest, _, name = line.partition("  ")
-        if not (found := digest_of_file(folder / name)):
+        if not (found := files.digest_of_file(folder / name)):
             wrong.append(Problem(str(folder / name), "is missing"))
         elif found != digest:
             message = f"differs from its checksum in {SUMS_FILE}"
@@ -123,9 +114,11 @@ def card(template: str, /, **facts: object) -> str:
     )
 
 
-def scene_card(name: str, tasks: _Tasks, command: str, palette: Palette, rejected: int) -> str:
+def scene_card(
+    name: str, tasks: Sequence[AssemblyTask], command: str, palette: Palette, rejected: int
+) -> str:
     """Return the Markdown card of scenes that `command` generated."""
-    scenes, sizes = [scene for scene, _ in tasks], {len(offered) for _, offered in tasks}
+    scenes, sizes = [task.scene for task in tasks], {len(task.candidates) for task in tasks}
 
     def bases(some: Iterable[Scene]) -> int:
         return sum(scene.parents == (scene.id,) for scene in some)
@@ -225,14 +218,14 @@ class Commitment(Line, extra="forbid"):
 def commit_season(folder: Path, arguments: str, public: str) -> tuple[Path, Path]:
     """Write a new secret and the commitment to it, and return the two files."""
     paths = (folder / "secret.txt", folder / "commitment.json")
-    check_free(paths, "give another --out")
+    files.check_free(paths, "give another --out")
     secret = secrets.token_hex(32)
     commitment = Commitment.now(secret, arguments, public)
-    make_folder(folder)
-    with writing(folder):
-        atomic_write(paths[0], f"{secret}\n")
+    files.make_folder(folder)
+    with files.writing(folder):
+        files.atomic_write(paths[0], f"{secret}\n")
         paths[0].chmod(0o600)
-        atomic_write(paths[1], f"{commitment.as_json()}\n")
+        files.atomic_write(paths[1], f"{commitment.as_json()}\n")
     return paths
 
 
@@ -255,8 +248,8 @@ def reveal_season(commitment: Path, secret: Path, public: str) -> tuple[str, int
 def code_digest() -> str:
     """Return the digest of the package's own files and the built-in scenes, with their names."""
     root = Path(phyblock.__file__).parent
-    files = (path for path in root.rglob("*") if path.suffix in (".py", ".md", ".yaml"))
-    named = sorted((path.relative_to(root).as_posix(), path) for path in files)
+    own = (path for path in root.rglob("*") if path.suffix in (".py", ".md", ".yaml"))
+    named = sorted((path.relative_to(root).as_posix(), path) for path in own)
     named = [(name, path) for name, path in named if not name.startswith("bundled/")]
-    named += [(name, find_data_set(name) / SCENES_FILE) for name in bundled_sets(SCENES_FILE)]
+    named += [(name, find_data_set(name) / SCENES_FILE) for name in files.bundled_sets(SCENES_FILE)]
     return hex_digest("".join(f"{hex_digest(path.read_bytes())} {name}\n" for name, path in named))

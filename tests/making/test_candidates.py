@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from phyblock.domain.blocks import KIT_PALETTE
 from phyblock.domain.scene import MAX_CANDIDATES, Candidate, Plan, Scene
 from phyblock.errors import DataError
-from phyblock.making.scenes.candidates import NEEDED, make_candidates
-from phyblock.making.scenes.production import Request, draw, shares
+from phyblock.making.scenes.production import NEEDED, Request, draw, make_candidates, shares
 from phyblock.making.scenes.sketch import POSES
 from phyblock.tracks.full_planning import goal_blind_plans
 from phyblock.types import SETTINGS

@@ -54,8 +54,8 @@ def test_what_the_grammar_draws_keeps_its_limits(request_):
     scene = draw(request_)
     if scene is not None:
         assert scene.levels == tuple(GROUPS[request_.group].levels)
-        facts = SceneFacts(scene, palette=sketch.PALETTES[request_.palette])
-        assert list(findings_of(facts, FORM)) == []
+        assert list(findings_of(SceneFacts(scene), FORM)) == []
+        assert {block.kind for block in scene.blocks} <= {*sketch.PALETTES[request_.palette]}
         assert find_overlaps(scene.blocks) == find_gaps(scene.blocks) == ()
         assert len({block.look for block in scene.blocks}) <= 14
 
@@ -116,7 +116,8 @@ SMALL = (Share("1", 3, 1), Share("2", 4, 2), Share("3", 2, 1))
 @pytest.fixture(scope="module")
 def scenes():
     with open_workers(1) as workers:
-        return list(production.Production(8, "kit", workers).scenes(SMALL))
+        made = production.Production(8, "kit", workers, frozenset()).tasks(SMALL)
+        return [task.scene for task in made]
 
 
 @given(st.integers(1, 5000), st.sets(st.integers(1, 5), min_size=1))
@@ -171,9 +172,9 @@ def test_splits_share_no_scene_with_one_another_or_with_the_built_in_set():
 def test_no_generated_scene_has_a_form_of_the_built_in_set(count, jobs):
     with open_workers(jobs) as workers:
         made_here = production.Production(3, "kit", workers, builtin_forms())
-        made = list(made_here.scenes(production.shares(count)))
+        made = list(made_here.tasks(production.shares(count)))
     assert made_here.rejected
-    assert not builtin_forms() & {sketch.colorless(scene.blocks) for scene in made}
+    assert not builtin_forms() & {sketch.colorless(task.scene.blocks) for task in made}
 
 
 angles = st.floats(-180, 180).map(lambda angle: round(angle, 3))

@@ -15,7 +15,7 @@ from phyblock.domain.blocks import BLOCK_TYPES, KIT_PALETTE
 from phyblock.domain.question import Mark, QuestionPicture
 from phyblock.domain.scene import Candidate, CandidateSet, Scene
 from phyblock.errors import DataError
-from phyblock.making.scenes.candidates import make_candidates
+from phyblock.making.scenes.production import make_candidates
 from phyblock.making.scenes.sketch import POSES
 from phyblock.sim import pictures
 from phyblock.sim import question_pictures as asked

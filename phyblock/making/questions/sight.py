@@ -17,15 +17,8 @@ import numpy as np
 from phyblock.domain.blocks import COLORS, SHAPES, BlockType, Color, euler_deg_to_matrix
 from phyblock.domain.question import QuestionPicture
 from phyblock.domain.scene import Block, Scene
-from phyblock.making.questions.base import (
-    Draft,
-    Floats,
-    Slots,
-    UnfairError,
-    View,
-    pick,
-    shuffled,
-)
+from phyblock.making.questions import base
+from phyblock.making.questions.base import Draft, Floats, Slots, UnfairError, View
 from phyblock.sim.contact import GROUND, bounds_m, support_graph
 from phyblock.sim.pictures import PictureStyle, drawn_m, goal_camera, shoot, visible_shares
 from phyblock.sim.question_pictures import is_inside, least_difference, seen, seen_order
@@ -58,7 +51,7 @@ def palette(rng: np.random.Generator) -> list[Color]:
 
     So at most one of red, orange and green is possible, and green is too close to yellow.
     """
-    return shuffled(rng, (pick(rng, ("red", "orange")), *PLAIN_COLORS[1:]))
+    return base.shuffled(rng, (base.pick(rng, ("red", "orange")), *PLAIN_COLORS[1:]))
 
 
 def orders_of(blocks: Sequence[Block]) -> list[int]:
@@ -402,7 +395,7 @@ def drawn_name(
 ) -> str | None:
     """Return one of the shortest expressions that fit only this block, or None."""
     expressions = names(block, picture, features)
-    return pick(rng, expressions[:_NAMES_DRAWN_FROM]) if expressions else None
+    return base.pick(rng, expressions[:_NAMES_DRAWN_FROM]) if expressions else None
 
 
 def plain_names(picture: QuestionPicture) -> Mapping[int, str]:

@@ -1,4 +1,4 @@
-"""Base scenes and their variations, each from its own seed.
+"""Base scenes and their variations, each from its own seed, and candidate sets.
 
 A scene is a pure function of its request: a seed, a group, a number, and for a variation the
 requests of the scenes it is made from. So any process can draw any scene, in any order.
@@ -21,29 +21,14 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from phyblock.data.scenes import read_builtin
-from phyblock.domain.blocks import COLORS
-from phyblock.domain.scene import (
-    SYMMETRIES,
-    AssemblyTask,
-    Block,
-    CycleError,
-    Kind,
-    Scene,
-    fingerprint,
-)
+from phyblock.domain import scene as scenes
+from phyblock.domain.blocks import COLORS, BlockType
+from phyblock.domain.scene import AssemblyTask, Block, Candidate, CandidateSet, Kind, Look, Scene
 from phyblock.errors import DataError, Problem
 from phyblock.files import bundled, read_own_yaml
 from phyblock.making.checks import LEVEL_LIMITS, is_acceptable
-from phyblock.making.scenes.candidates import make_candidates
-from phyblock.making.scenes.sketch import (
-    PALETTES,
-    Draft,
-    Palette,
-    beside,
-    colorless,
-    make_scene,
-    transformed,
-)
+from phyblock.making.scenes import sketch
+from phyblock.making.scenes.sketch import PALETTES, POSES, Draft, Palette, colorless
 from phyblock.sim.contact import find_gaps
 from phyblock.text import drawn_bytes
 from phyblock.workers import Workers
@@ -99,11 +84,11 @@ def draw(request: Request) -> Scene | None:
     for parent in request.parents:
         scene = draw(parent)
         assert scene is not None
-        symmetry = SYMMETRIES[int(rng.integers(len(SYMMETRIES)))]
-        parts.append(transformed(scene.blocks, symmetry))
+        symmetry = scenes.SYMMETRIES[int(rng.integers(len(scenes.SYMMETRIES)))]
+        parts.append(sketch.transformed(scene.blocks, symmetry))
     if len(parts) > 1:
         gap, axis = (1.0, 1.0, 2.0)[int(rng.integers(3))], (1, 1, 0)[int(rng.integers(3))]
-        return _fitting("combined", request.group, beside(parts, gap, axis))
+        return _fitting("combined", request.group, sketch.beside(parts, gap, axis))
     # Blocks of one type and color keep one color in common, a new one if the palette has one.
     taken: dict[Kind, Kind] = {}
     for kind in dict.fromkeys(block.kind for block in parts[0]):
@@ -135,8 +120,8 @@ def _fitting(name: str, group: str, blocks: list[Block]) -> Scene | None:
     limits = [LEVEL_LIMITS[level] for level in levels]
     if not least <= len(blocks) <= min(limit.most_blocks for limit in limits):
         return None
-    with suppress(CycleError):
-        scene = make_scene(name, levels, blocks)
+    with suppress(scenes.CycleError):
+        scene = sketch.make_scene(name, levels, blocks)
         is_low = max(scene.graph.layers) <= min(limit.most_layers for limit in limits)
         if is_low and len({block.look for block in scene.blocks}) <= _MAX_LOOKS:
             return scene
@@ -197,7 +182,7 @@ def _drawn(request: Request) -> Drawn | None:
     scene = draw(request)
     if scene is None:
         return None
-    return Drawn(request, scene, fingerprint(scene.blocks), colorless(scene.blocks))
+    return Drawn(request, scene, scenes.fingerprint(scene.blocks), colorless(scene.blocks))
 
 
 class Production:
@@ -207,9 +192,7 @@ class Production:
     number, and of equal ones the lowest is kept. `rejected` counts those with a form of `excluded`.
     """
 
-    def __init__(
-        self, seed: int, palette: Palette, workers: Workers, excluded: Set[bytes] = frozenset()
-    ) -> None:
+    def __init__(self, seed: int, palette: Palette, workers: Workers, excluded: Set[bytes]) -> None:
         self._seed, self._palette, self._workers = seed, palette, workers
         self._excluded, self.rejected = excluded, 0
         self._seen: set[bytes] = set()
@@ -217,24 +200,26 @@ class Production:
         self._next: Counter[str] = Counter()
         self._named: Counter[int] = Counter()
 
-    def scenes(self, wanted: Sequence[Share]) -> Iterator[Scene]:
+    def tasks(self, wanted: Sequence[Share]) -> Iterator[AssemblyTask]:
         """Yield base scenes by group, then variations, with more base scenes for missing ones.
 
         Raises DataError if the rules give no more different scenes.
         """
         width = max(3, len(str(sum(share.base + share.varied for share in wanted))))
 
-        def named(scene: Scene) -> Scene:
+        def named(scene: Scene, *parents: str) -> AssemblyTask:
             level = scene.levels[0]
             self._named[level] += 1
-            return replace(scene, id=f"l{level}-{self._named[level]:0{width}d}-{scene.id}")
+            name = f"l{level}-{self._named[level]:0{width}d}-{scene.id}"
+            scene = replace(scene, id=name, parents=parents or (name,))
+            return AssemblyTask(scene, make_candidates(scene, palette=self._palette))
 
-        def bases(group: str, count: int) -> Iterator[Scene]:
+        def bases(group: str, count: int) -> Iterator[AssemblyTask]:
             taken, request = 0, partial(Request, self._seed, self._palette, group)
-            for made, drawn in self._accepted(count, request, self._next[group]):
-                taken, self._next[group], scene = taken + 1, made.number + 1, named(drawn)
-                self._bases[made] = scene.id
-                yield replace(scene, parents=(scene.id,))
+            for made, scene in self._accepted(count, request, self._next[group]):
+                taken, self._next[group], task = taken + 1, made.number + 1, named(scene)
+                self._bases[made] = task.key
+                yield task
             if taken < count:
                 message = f"gave no more than {taken} new scenes of {count}"
                 hint = "ask for fewer scenes, for other levels, or for --palette full"
@@ -246,8 +231,7 @@ class Production:
             taken = 0
             for made, scene in self._varied(share):
                 taken += 1
-                parents = tuple(dict.fromkeys(self._bases[parent] for parent in made.parents))
-                yield replace(named(scene), parents=parents)
+                yield named(scene, *dict.fromkeys(self._bases[base] for base in made.parents))
             yield from bases(share.group, share.varied - taken)
 
     def _varied(self, share: Share) -> Iterator[tuple[Request, Scene]]:
@@ -273,7 +257,6 @@ class Production:
     ) -> Iterator[tuple[Request, Scene]]:
         """Yield the first `wanted` sound and new candidates, in the order of their numbers."""
         number, taken, last = first, 0, first
-        is_sound = partial(is_acceptable, palette=PALETTES[self._palette])
         while taken < wanted and number - last <= _PATIENCE:
             size = min(_LARGEST_ROUND, max(8, math.ceil((wanted - taken) * 1.3)))
             requests = [request(number + i) for i in range(size)]
@@ -285,11 +268,78 @@ class Production:
                 elif one.form not in self._seen:
                     self._seen.add(one.form)
                     fresh.append(one)
-            sound = self._workers.map(is_sound, [one.scene for one in fresh])
+            sound = self._workers.map(is_acceptable, [one.scene for one in fresh])
             kept = (one for one, is_kept in zip(fresh, sound, strict=True) if is_kept)
             for one in islice(kept, wanted - taken):
                 taken, last = taken + 1, one.request.number
                 yield one.request, one.scene
+
+
+# Candidate sets: the needed blocks, and distractors that other goals need as often. Nothing may
+# reveal whether a candidate is needed: neither its look, nor the number of poses in which its kind
+# is offered, nor its place in the list. So distractors are drawn at rates that make every look
+# needed in the same share of the sets that offer it.
+
+NEEDED: dict[BlockType, dict[str, float]] = read_own_yaml(Path(__file__).with_name("needed.yaml"))
+"""Mean number of looks of a type and pose, over all its colors, that a goal of the grammar needs,
+counted in 1,200 goals. Poses that no goal needs would give themselves away and are not offered."""
+_EVEN_SHARE = 0.36
+"""Share of the sets that offer a look in which it is needed: 5.76 of 16 on average."""
+_RISING: tuple[tuple[BlockType, ...], ...] = (
+    *(("arch",), ("cylinder",), ("cuboid2",), ("cuboid3",), ("cube",), ("cuboid1",)),
+    ("triangle", "semi_cylinder"),
+)
+"""Types from those low in goals to those high in them. So naming all candidates as listed is
+already a good building order, and a reader gains nothing by finding a better one."""
+_TIERS = {block_type: tier for tier, types in enumerate(_RISING) for block_type in types}
+_RARER: dict[BlockType, float] = {"triangle": 0.7}
+"""Factors on how often a type is drawn as a distractor. Triangles have one color and six poses: in
+setting B, where poses do not count, all of them are the same block offered repeatedly, and leaving
+some out would pay."""
+_MOST_DRAWN = 0.98
+"""Upper limit: looks that more than `_EVEN_SHARE` of all goals need are nearly always offered."""
+
+
+def make_candidates(scene: Scene, seed: int = 0, *, palette: Palette = "kit") -> CandidateSet:
+    """Return up to `MAX_CANDIDATES` candidates that look different, with all that a scene needs.
+
+    Types that are low in goals come first, else the order is random. The same scene id and seed
+    give the same set everywhere. Raises DataError if the scene needs more looks.
+    """
+    needed: dict[Look, Candidate] = {}
+    for block in scene.blocks:
+        needed.setdefault(block.look, Candidate(block.type, block.color, block.euler_deg))
+    if len(needed) > scenes.MAX_CANDIDATES:
+        allowed = f"at most {scenes.MAX_CANDIDATES}"
+        message = "needs more different blocks than a candidate set holds"
+        raise DataError(Problem(scene.id, message, "blocks", str(len(needed)), allowed))
+    # The rate per unit of time at which each look that some goal needs is drawn as a distractor:
+    # the probability of being drawn within one unit gives the look its even share.
+    colors = Counter(block_type for block_type, _ in PALETTES[palette])
+    others: dict[Candidate, float] = {}
+    for block_type, color in PALETTES[palette]:
+        added = dict.fromkeys(POSES[block_type], _EVEN_SHARE)
+        for pose, count in NEEDED.get(block_type, added).items():
+            share = count / colors[block_type]
+            drawn = min(share * (1 / _EVEN_SHARE - 1) / (1 - share), _MOST_DRAWN)
+            one = Candidate(block_type, color, POSES[block_type][pose])
+            if one.look not in needed:
+                others[one] = -math.log1p(-drawn) * _RARER.get(block_type, 1.0)
+
+    def number(one: Candidate, purpose: str) -> float:
+        """Return a number in (0, 1) from a hash: the same on every platform and Python."""
+        digest = drawn_bytes(f"{seed}/{scene.id}/{purpose}/{one}")
+        return (int.from_bytes(digest[:6], "big") + 0.5) / 2**48
+
+    def waiting(one: Candidate) -> float:
+        """Draw a candidate's exponential waiting time (Efraimidis and Spirakis 2006)."""
+        return -math.log(number(one, "drawn")) / others[one]
+
+    def place(one: Candidate) -> tuple[int, float]:
+        return _TIERS.get(one.type, len(_RISING)), number(one, "place")
+
+    distractors = sorted(others, key=waiting)[: scenes.MAX_CANDIDATES - len(needed)]
+    return CandidateSet(tuple(sorted([*needed.values(), *distractors], key=place)))
 
 
 Split = Literal["train", "dev"]
@@ -340,10 +390,10 @@ def split_tasks(
                 for each in (*parents, one)
             ):
                 continue
-            if is_acceptable(one.scene, PALETTES[palette]):
+            if is_acceptable(one.scene):
                 name, *names = (f"{p.scene.id}-{p.form.hex()[:12]}" for p in (one, *parents))
                 scene = replace(one.scene, id=name, parents=tuple(dict.fromkeys(names or [name])))
-                yield AssemblyTask(scene, make_candidates(scene, palette=PALETTES[palette]))
+                yield AssemblyTask(scene, make_candidates(scene, palette=palette))
                 break
         else:
             message = f"none new in {_LONGEST_SEARCH} tries"

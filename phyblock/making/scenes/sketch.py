@@ -17,26 +17,11 @@ from typing import Any, Literal, TypeVar, cast
 
 import numpy as np
 
+from phyblock.domain import scene
 from phyblock.domain.blocks import BLOCK_TYPES, COLORS, KIT_PALETTE, SHAPES, BlockType, Color, Euler
-from phyblock.domain.scene import (
-    AOVGraph,
-    Block,
-    Scene,
-    Symmetry,
-    fingerprint,
-    image_deg,
-    image_m,
-    pose_class,
-)
+from phyblock.domain.scene import AOVGraph, Block, Scene, Symmetry
 from phyblock.files import read_own_yaml
-from phyblock.sim.contact import (
-    GROUND,
-    at,
-    bounds_m,
-    drop_height_m,
-    support_graph,
-    whole_bounds_m,
-)
+from phyblock.sim import contact
 
 POSES: Mapping[BlockType, Mapping[str, Euler]] = {
     block_type: shape.poses for block_type, shape in SHAPES.items()
@@ -49,7 +34,7 @@ def transformed(blocks: Sequence[Block], symmetry: Symmetry) -> tuple[Block, ...
     return tuple(
         replace(
             block,
-            position_m=image_m(block.position_m, symmetry),
+            position_m=scene.image_m(block.position_m, symmetry),
             euler_deg=_turned(block.type, block.euler_deg, symmetry),
         )
         for block in blocks
@@ -58,16 +43,16 @@ def transformed(blocks: Sequence[Block], symmetry: Symmetry) -> tuple[Block, ...
 
 def colorless(blocks: Iterable[Block]) -> bytes:
     """Return a fingerprint that structures share if they differ only in colors."""
-    return fingerprint([replace(block, color=COLORS[0]) for block in blocks])
+    return scene.fingerprint([replace(block, color=COLORS[0]) for block in blocks])
 
 
 @functools.cache
 def _turned(block_type: BlockType, euler_deg: Euler, symmetry: Symmetry) -> Euler:
     """Return the angles of the image of a pose, as in `POSES` if that has the pose."""
-    angles = image_deg(euler_deg, symmetry)
-    wanted = pose_class(block_type, angles)
+    angles = scene.image_deg(euler_deg, symmetry)
+    wanted = scene.pose_class(block_type, angles)
     for known in POSES[block_type].values():
-        if pose_class(block_type, known) == wanted:
+        if scene.pose_class(block_type, known) == wanted:
             return known
     return angles
 
@@ -79,19 +64,19 @@ _LIFT_M = 1.0
 
 def lowered(block: Block, onto: Sequence[Block], x_m: float, y_m: float) -> Block:
     """Lower a block, the middle of its outline over (x, y) [m], to the first block or the floor."""
-    middle = bounds_m(block).mean(axis=0)
+    middle = contact.bounds_m(block).mean(axis=0)
     x, y = (
         float(round(start + to - float(half), 6)) + 0.0
         for start, to, half in zip(block.position_m, (x_m, y_m), middle, strict=False)
     )
     lifted = replace(block, position_m=(x, y, block.position_m[2] + _LIFT_M))
-    fall_m = drop_height_m(lifted, onto)
+    fall_m = contact.drop_height_m(lifted, onto)
     return replace(lifted, position_m=(x, y, round(lifted.position_m[2] - fall_m, 6) + 0.0))
 
 
 def make_scene(name: str, levels: tuple[int, ...], blocks: list[Block]) -> Scene:
     """Return the scene of blocks, its ground plan centered at the origin; raises as `scene_of`."""
-    middle_x, middle_y, _ = whole_bounds_m(blocks).mean(axis=0).tolist()
+    middle_x, middle_y, _ = contact.whole_bounds_m(blocks).mean(axis=0).tolist()
     centered = []
     for block in blocks:
         x, y, z = block.position_m
@@ -106,9 +91,9 @@ def scene_of(
     """Return the scene that blocks form where they are: dependencies from contact, layers from the
     longest path. Raises CycleError if contacts allow no order.
     """
-    below = support_graph(blocks)
+    below = contact.support_graph(blocks)
     finished = tuple(
-        replace(block, depend=tuple(sorted(below[block.order] - {GROUND})), layer=layer)
+        replace(block, depend=tuple(sorted(below[block.order] - {contact.GROUND})), layer=layer)
         for block, layer in zip(blocks, graph_of(below).layers, strict=True)
     )
     return Scene(name, levels, finished, parents or (name,))
@@ -117,7 +102,7 @@ def scene_of(
 def graph_of(below: Mapping[int, Collection[int]]) -> AOVGraph:
     """Return the graph of blocks, by the orders that each rests on. Raises CycleError."""
     number = {order: vertex for vertex, order in enumerate(below)}
-    held = (frozenset(number[o] for o in under if o != GROUND) for under in below.values())
+    held = (frozenset(number[o] for o in under if o != contact.GROUND) for under in below.values())
     return AOVGraph(tuple(held))
 
 
@@ -174,7 +159,7 @@ class Draft:
         poses = POSES[block_type]
         euler = poses[pose] if pose else next(iter(poses.values()))
         color = color or SHAPES[block_type].kit_colors[0]
-        block = replace(at((block_type, euler)), order=len(self.blocks) + 1, color=color)
+        block = replace(contact.at((block_type, euler)), order=len(self.blocks) + 1, color=color)
         self.blocks.append(lowered(block, self.blocks, x * UNIT_M, y * UNIT_M))
 
     def build(self, text: str, tone: int = 0) -> None:
@@ -242,7 +227,7 @@ def beside(parts: Sequence[Sequence[Block]], gap_units: float, axis: int = 1) ->
     row: list[Block] = []
     edge_m = 0.0
     for part in parts:
-        low_m, high_m = whole_bounds_m(part)
+        low_m, high_m = contact.whole_bounds_m(part)
         shift = -(low_m + high_m) / 2
         shift[2] = 0.0
         shift[axis] = edge_m - low_m[axis]
