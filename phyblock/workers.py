@@ -183,10 +183,7 @@ def _each(
 
 @contextlib.contextmanager
 def open_workers(
-    jobs: int = 1,
-    ray_address: str | None = None,
-    shards: Shards | None = None,
-    size: int = 1,
+    jobs: int = 1, ray_address: str | None = None, shards: Shards | None = None, size: int = 1
 ) -> Iterator[Workers]:
     """Open workers for the duration of a with statement: `jobs` processes, or only this one.
 

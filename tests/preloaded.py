@@ -20,7 +20,7 @@ _PRELOADED = (
     *(
         "phyblock.making.cli",
         "phyblock.sim.pybullet",
-        "phyblock.web.report",
+        "phyblock.web.pages",
         "pyarrow.pandas_compat",
         "sqlite3",
         "yarl",

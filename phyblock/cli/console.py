@@ -225,10 +225,7 @@ NAME_OR_PATH = UserPath(path_type=str)
 
 run_argument = click.argument("run", type=UserPath())
 models_file_option = click.option(
-    "--models-file",
-    type=NAME_OR_PATH,
-    metavar="FILE",
-    help="Models file instead of models.yaml.",
+    "--models-file", type=NAME_OR_PATH, metavar="FILE", help="Models file instead of models.yaml."
 )
 data_option = click.option(
     "--data",

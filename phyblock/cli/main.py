@@ -22,10 +22,7 @@ _SECTIONS = {
         "init": (f"{_CLI}.setup:init", "Create a folder: a suite, models.yaml, prompts."),
         "validate": (f"{_CLI}.setup:validate", "Check suites, models files and data sets."),
         "models": (f"{_CLI}.setup:models", "List models with prices and keys."),
-        "cache": (
-            f"{_CLI}.setup:cache",
-            "List replies kept for other runs, or delete some.",
-        ),
+        "cache": (f"{_CLI}.setup:cache", "List replies kept for other runs, or delete some."),
         "run": (f"{_CLI}.run:run", "Run a suite, or continue where it stopped."),
         "play": (f"{_CLI}.run:play", "Answer a suite yourself, in a browser."),
         "score": (f"{_CLI}.run:score", "Score stored replies again; calls no model."),

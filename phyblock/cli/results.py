@@ -9,17 +9,7 @@ from typing import TYPE_CHECKING
 import click
 from rich.console import Console
 
-from phyblock.cli.console import (
-    UserPath,
-    data_folders_option,
-    data_option,
-    make_console,
-    models_option,
-    print_path,
-    print_table,
-    run_argument,
-    shown_path,
-)
+from phyblock.cli import console as ui
 from phyblock.errors import DataError, Problem, SpecError, StoreError
 from phyblock.results.text import REPORT_FILE, TABLES
 from phyblock.text import counted, one_line, some_of
@@ -32,7 +22,7 @@ _FAILURES = 4
 
 
 @click.command()
-@run_argument
+@ui.run_argument
 @click.option("--print", "prints", is_flag=True, help="Print all tables; write nothing.")
 @click.option("--only", "names", multiple=True, metavar="NAME", help="Print only this table.")
 @click.option(
@@ -41,15 +31,15 @@ _FAILURES = 4
     default="text",
     help="Form of printed tables.",
 )
-@data_option
+@ui.data_option
 def report(run: Path, prints: bool, names: tuple[str, ...], form: str, data: Path | None) -> None:
     """Write tables and report.html of the folder RUN again, or print its tables.
 
     Uses only the files of the run: no model, no network. Draws scenes if their data are there.
     """
-    console = make_console()
+    console = ui.make_console()
     if not (prints or names or form != "text"):
-        print_path(console, show_tables(run, data))
+        ui.print_path(console, show_tables(run, data))
         return
     from phyblock.results.load import load_run
     from phyblock.results.tables import make_tables, table_names
@@ -62,7 +52,7 @@ def report(run: Path, prints: bool, names: tuple[str, ...], form: str, data: Pat
         console.print("The run has no numbers for this table.")
     for name, table in tables.items():
         if form == "text":
-            print_table(console, table)
+            ui.print_table(console, table)
         else:
             click.echo(to_markdown(table) if form == "md" else to_latex(table, f"phyblock-{name}"))
 
@@ -78,24 +68,24 @@ def show_tables(folder: Path, data: Path | None = None, *, page: bool = True) ->
     from phyblock.results.tables import summary_of, write_tables
 
     written = write_tables(folder)
-    console, summary = make_console(), summary_of(written.run)
+    console, summary = ui.make_console(), summary_of(written.run)
     for table in summary.tables:
-        print_table(console, table)
+        ui.print_table(console, table)
     for model, message, times in summary.failures[:_FAILURES]:
         console.print(one_line(f"{times:,} x {model}: {message}"), style="yellow")
     for sentence in summary.blind:
         console.print(sentence)
     if page:
-        from phyblock.web.report import write_report
+        from phyblock.web.pages import write_report
 
         write_report(written, data)
     return folder / (REPORT_FILE if page else TABLES)
 
 
 @click.command()
-@run_argument
+@ui.run_argument
 @click.argument("sample")
-@data_option
+@ui.data_option
 def show(run: Path, sample: str, data: Path | None) -> None:
     """Show SAMPLE of the folder RUN: prompt, reply, parsed answer, and the verdict of each step.
 
@@ -113,7 +103,7 @@ def show(run: Path, sample: str, data: Path | None) -> None:
         message, allowed = f"{len(matching):,} samples fit", some_of(matching or list(starts))
         raise StoreError(Problem(str(run / RECORDS), message, "sample", sample, allowed))
     record = next(iter(lines.at([starts[matching[0]]])))
-    console = make_console()
+    console = ui.make_console()
     console.print(record.sample, style="bold")
     facts = [f"scene {record.scene}", f"level {', '.join(map(str, record.levels))}"]
     facts += [counted(record.n_blocks, "block"), record.outcome.replace("_", " ")]
@@ -179,12 +169,14 @@ def _print_prompt(console: Console, run: Path, record: Record) -> None:
 
 
 @click.command()
-@run_argument
-@click.argument("other", type=UserPath(), required=False)
-@models_option("Only these models; of two runs, A of the first.")
+@ui.run_argument
+@click.argument("other", type=ui.UserPath(), required=False)
+@ui.models_option("Only these models; of two runs, A of the first.")
 @click.option("--track", metavar="NAME", default="", show_default="the first in both")
 @click.option("--measure", metavar="NAME", default="", show_default="the headline measure")
-@click.option("--out", type=UserPath(), metavar="DIR", help="Folder for CSV, Markdown and LaTeX.")
+@click.option(
+    "--out", type=ui.UserPath(), metavar="DIR", help="Folder for CSV, Markdown and LaTeX."
+)
 def compare(
     run: Path, other: Path | None, models: Sequence[str], track: str, measure: str, out: Path | None
 ) -> None:
@@ -199,17 +191,17 @@ def compare(
 
     beside = None if other is None else load_run(other)
     comparison = load_run(run).compare(beside, models, track, measure)
-    console = make_console()
-    print_table(console, compare_view(comparison))
+    console = ui.make_console()
+    ui.print_table(console, compare_view(comparison))
     if len(comparison.table[["a", "b"]].drop_duplicates()) > 1 and len(comparison.ranks):
-        print_table(console, ranks_view(comparison))
+        ui.print_table(console, ranks_view(comparison))
     if out is not None:
         write_comparison(comparison, out)
-        print_path(console, out)
+        ui.print_path(console, out)
 
 
 @click.command()
-@run_argument
+@ui.run_argument
 @click.option("--only", "names", multiple=True, metavar="NAME", help="Only this one; repeatable.")
 @click.option(
     "--width",
@@ -219,13 +211,9 @@ def compare(
     help="Width in millimeters; a column of a two-column paper has 85.",
 )
 @click.option("--no-title", is_flag=True, help="Leave the title to the caption.")
-@click.option("--out", type=UserPath(), metavar="DIR", help="Folder. [default: RUN/paper]")
+@click.option("--out", type=ui.UserPath(), metavar="DIR", help="Folder. [default: RUN/paper]")
 def figures(
-    run: Path,
-    names: tuple[str, ...],
-    width: float,
-    no_title: bool,
-    out: Path | None,
+    run: Path, names: tuple[str, ...], width: float, no_title: bool, out: Path | None
 ) -> None:
     """Draw figures of the folder RUN for a paper: PDF and SVG with real text, PNG for slides, and
     captions as plain text.
@@ -235,18 +223,20 @@ def figures(
     from phyblock.results.figures import figures_of, write_paper_figures
     from phyblock.results.load import load_run
 
-    loaded, console = load_run(run), make_console()
+    loaded, console = load_run(run), ui.make_console()
     _check_names(run, names, figures_of(loaded), "figure")
     drawn = write_paper_figures(loaded, names, out, width_in=width / 25.4, titled=not no_title)
     for file in drawn:
-        print_path(console, file)
+        ui.print_path(console, file)
     if not drawn:
         console.print("The run has no numbers for any figure.")
 
 
 @click.command()
-@run_argument
-@click.option("--out", type=UserPath(), metavar="FILE", help="The file. [default: RUN/bundle.zip]")
+@ui.run_argument
+@click.option(
+    "--out", type=ui.UserPath(), metavar="FILE", help="The file. [default: RUN/bundle.zip]"
+)
 def bundle(run: Path, out: Path | None) -> None:
     """Write the folder RUN as one file: manifest, records, digests.
 
@@ -255,15 +245,15 @@ def bundle(run: Path, out: Path | None) -> None:
     """
     from phyblock.bundle import bundle_run
 
-    console = make_console()
+    console = ui.make_console()
     path = bundle_run(run, out)
     console.print(f"{path.stat().st_size / 1000:,.0f} kB:")
-    print_path(console, path)
+    ui.print_path(console, path)
 
 
 @click.command()
-@click.argument("file", type=UserPath())
-@data_folders_option
+@click.argument("file", type=ui.UserPath())
+@ui.data_folders_option
 def verify(file: Path, data: tuple[Path, ...]) -> None:
     """Score the replies in the bundle FILE again, and report if its records are the same bytes,
     what was not verified, and if samples are missing. Exits with 2 if the records differ.
@@ -272,9 +262,9 @@ def verify(file: Path, data: tuple[Path, ...]) -> None:
     """
     from phyblock.bundle import opened_bundle
 
-    console = make_console()
+    console = ui.make_console()
     with opened_bundle(file, data) as verified:
-        console.print(f"{shown_path(file)} verifies.")
+        console.print(f"{ui.shown_path(file)} verifies.")
         samples = f"{verified.records:,} of {verified.expected:,} expected samples"
         is_whole = verified.records == verified.expected
         console.print(f"{samples}." if is_whole else f"{samples}: the run is not complete.")
@@ -288,9 +278,9 @@ def verify(file: Path, data: tuple[Path, ...]) -> None:
 
 
 @click.command()
-@click.argument("runs", nargs=-1, required=True, type=UserPath())
-@click.option("--out", type=UserPath(), required=True, metavar="DIR", help="Folder of the site.")
-@data_folders_option
+@click.argument("runs", nargs=-1, required=True, type=ui.UserPath())
+@click.option("--out", type=ui.UserPath(), required=True, metavar="DIR", help="Folder of the site.")
+@ui.data_folders_option
 @click.option("--title", default="PhyBlock leaderboard", help="Its title.")
 def site(runs: tuple[Path, ...], out: Path, data: tuple[Path, ...], title: str) -> None:
     """Write RUNS (run folders and bundles) as one static folder: ranks, a page for every model
@@ -299,11 +289,11 @@ def site(runs: tuple[Path, ...], out: Path, data: tuple[Path, ...], title: str) 
     The folder opens from disk or from any web server. Runs must use one version of the data and one
     prompt. Bundles are scored again first, and those that do not verify are refused.
     """
-    from phyblock.web.leaderboard import write_site
+    from phyblock.web.pages import write_site
 
-    console = make_console()
+    console = ui.make_console()
     made = write_site(runs, out, data, title)
     if made.lacking:
         console.print(made.lacking)
     console.print(f"{made.models:,} models and baselines, {counted(made.samples, 'sample')}:")
-    print_path(console, made.path)
+    ui.print_path(console, made.path)

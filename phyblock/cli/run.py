@@ -5,9 +5,13 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import gc
+import math
 import signal
 import sys
+import time
+from collections import Counter
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -15,76 +19,53 @@ from threading import Thread
 from typing import Any
 
 import click
+from rich import progress
 from rich.console import Console
+from rich.text import Text
 
-from phyblock.cli.console import (
-    INTERRUPTED,
-    NAME_OR_PATH,
-    UserPath,
-    data_option,
-    left_to_first,
-    limit_option,
-    make_console,
-    models_file_option,
-    models_option,
-    open_shards,
-    print_again,
-    print_path,
-    print_table,
-    run_argument,
-    run_out_option,
-    sets_option,
-    shown_path,
-    tracked,
-    worker_options,
-    yes_option,
-)
-from phyblock.cli.progress import ProgressView
+from phyblock.cli import console as ui
 from phyblock.cli.results import show_tables
 from phyblock.config.models import load_models
 from phyblock.config.yaml import read_yaml
 from phyblock.errors import Problem, SpecError
 from phyblock.files import OutFolder
+from phyblock.models.model import ModelEvent
 from phyblock.records.files import RECORDS, read_manifest
 from phyblock.results.text import NO_VALUE, REPORT_FILE, TABLES, Column, TextTable
+from phyblock.run import plan as plans
 from phyblock.run.manifest import code_versions
-from phyblock.run.plan import (
-    Estimate,
-    RunPlan,
-    bundled_suites,
-    check_models,
-    estimate,
-    find_models_file,
-    make_plan,
-    may_bill,
-    read_suite,
-)
-from phyblock.run.runner import RunResult, Session, completed
-from phyblock.run.store import held_run
+from phyblock.run.plan import Estimate, RunPlan
+from phyblock.run.runner import RunEvent, RunResult, RunStarted, SampleDone, Session, completed
+from phyblock.run.store import Summary, held_run
+from phyblock.scoring.plan import Counts
 from phyblock.text import counted, one_line, some_of
 from phyblock.tracks.base import kind_of
 from phyblock.workers import open_workers
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
+_LINE_EVERY_S = 10.0
+"""Interval of progress lines where no bar is shown [s]."""
+_SHOWN_EVERY_S = 0.1
+"""Minimum time between two updates of the display [s]."""
 
 
-@click.command(epilog=f"Bundled suites: {', '.join(bundled_suites())}.")
-@click.argument("suite", type=NAME_OR_PATH)
-@sets_option
-@models_option(
+@click.command(epilog=f"Bundled suites: {', '.join(plans.bundled_suites())}.")
+@click.argument("suite", type=ui.NAME_OR_PATH)
+@ui.sets_option
+@ui.models_option(
     "Run these models instead of the suite's: any of models.yaml, group:NAME for all of a group, "
     "or the baselines."
 )
-@limit_option
-@run_out_option
-@models_file_option
+@ui.limit_option
+@ui.run_out_option
+@ui.models_file_option
 @click.option("--no-cache", is_flag=True, help="Neither read nor write the reply cache.")
 @click.option("--dry-run", is_flag=True, help="Print calls, tokens and dollars; call nothing.")
 @click.option(
     "--retry-failed", is_flag=True, help="Ask again for samples whose request was rejected."
 )
 @click.option("--no-report", is_flag=True, help="Write only tables, no page.")
-@yes_option
+@ui.yes_option
 def run(
     suite: str,
     sets: tuple[str, ...],
@@ -103,11 +84,11 @@ def run(
     Writes every record as soon as it is complete. Run the same command again to continue where it
     stopped; no call is repeated.
     """
-    console = make_console()
-    loaded = read_suite(suite, sets)
-    models_path = find_models_file(models_file, loaded.files.path)
-    plan = make_plan(loaded, load_models(models_path), only=models, limit=limit)
-    check = partial(check_models, plan.models, read_yaml(models_path), needs_keys=True)
+    console = ui.make_console()
+    loaded = plans.read_suite(suite, sets)
+    models_path = plans.find_models_file(models_file, loaded.files.path)
+    plan = plans.make_plan(loaded, load_models(models_path), only=models, limit=limit)
+    check = partial(plans.check_models, plan.models, read_yaml(models_path), needs_keys=True)
     folder = out or plan.folder_in(Path("results"))
     made = folder / (TABLES if no_report else REPORT_FILE)
     held = held_run(folder, plan.manifest)
@@ -119,12 +100,12 @@ def run(
         and _is_newest(folder, made)
     )
     if held is not None and not is_as_it_was and not dry_run:
-        from phyblock.web.report import files_of
+        from phyblock.web.pages import files_of
 
         OutFolder(folder).check(files_of(page=not no_report))
     asks: dict[str, Any] = {"use_cache": not no_cache, "retry_failed": retry_failed}
     if dry_run:
-        print_estimate(console, plan, estimate(plan, folder, **asks))
+        print_estimate(console, plan, plans.estimate(plan, folder, **asks))
         try:
             check()
         except SpecError as error:
@@ -133,7 +114,7 @@ def run(
     check()
     has_limit = plan.suite.limits.max_cost_usd is not None
     is_asked = sys.stdin is not None and sys.stdin.isatty()
-    if rows := [] if yes or (has_limit and not is_asked) else may_bill(plan, folder, **asks):
+    if rows := [] if yes or (has_limit and not is_asked) else plans.may_bill(plan, folder, **asks):
         print_estimate(console, plan, rows)
         if not is_asked:
             found = ", ".join(row.model.name for row in rows if row.may_cost)
@@ -159,11 +140,11 @@ def run(
         show_tables(folder, page=not no_report)
         hint = ""
     else:
-        hint = f"phyblock report {shown_path(folder)} --print shows its tables."
+        hint = f"phyblock report {ui.shown_path(folder)} --print shows its tables."
     code = _conclude(console, folder, result, view)
     if hint:
         console.print(one_line(hint), style="dim", soft_wrap=True)
-    print_path(console, made)
+    ui.print_path(console, made)
     return code
 
 
@@ -176,7 +157,7 @@ def _is_newest(folder: Path, made: Path) -> bool:
 
 def _conclude(console: Console, folder: Path, result: RunResult, view: ProgressView) -> int:
     """Print the result of a run, its cost and how to continue; return the exit code."""
-    for remark in result.remarks(shown_path(folder)):
+    for remark in result.remarks(ui.shown_path(folder)):
         console.print(one_line(remark), style="red")
     done = f"All {result.samples:,} samples are done"
     if result.left:
@@ -192,10 +173,151 @@ def _conclude(console: Console, folder: Path, result: RunResult, view: ProgressV
         also = f"The run also holds {some_of(others)}: name them with --models to see them again."
         console.print(also, style="dim")
     if result.left:
-        print_again(console, "raise limits.max_cost_usd and run" if cause == "cost" else "run")
+        ui.print_again(console, "raise limits.max_cost_usd and run" if cause == "cost" else "run")
     if cause == "interrupted" and result.left:
-        return INTERRUPTED
+        return ui.INTERRUPTED
     return 1 if result.left or result.failed or result.unjudged else 0
+
+
+@dataclass
+class Tally:
+    """The sums over a model's records; `counts` are of the headline matcher and setting."""
+
+    task: progress.Task
+    counts: Counts = field(default_factory=lambda: Counts(0, 0, 0))
+    cost_usd: float = 0.0
+    unpriced: int = 0
+    cached: int = 0
+    retries: int = 0
+    failures: Counter[str] = field(default_factory=Counter)
+
+    def add(self, sample: Summary) -> None:
+        """Count one sample."""
+        self.failures.update([sample.outcome] if sample.outcome != "ok" else [])
+        if sample.counts is not None:
+            self.counts += sample.counts
+        if sample.cached is not None:
+            self.cached += sample.cached
+            self.unpriced += sample.paid_usd is None
+            self.cost_usd += sample.paid_usd or 0.0
+
+    @property
+    def facts(self) -> str:
+        """Return the text beside the bar."""
+        facts = []
+        if self.counts.f1 is not None:
+            facts.append(f"F1 {100 * self.counts.f1:.1f} %")
+        if self.cost_usd or self.unpriced:
+            facts.append(f"${self.cost_usd:,.2f}" + (" + unknown" if self.unpriced else ""))
+        numbers = {"cached": self.cached, "failed": self.failures.total()}
+        numbers["sent again"] = self.retries
+        return ", ".join([*facts, *(f"{n:,} {name}" for name, n in numbers.items() if n)])
+
+
+class ProgressView(progress.Progress):
+    """Shows a bar for each model in a terminal, occasional lines elsewhere; the run's watcher.
+
+    Notices are printed as lines, and so is the first repeated call of each model.
+    """
+
+    def __init__(self, console: Console, now: Callable[[], float] = time.monotonic) -> None:
+        self._tallies: dict[str, Tally] = {}
+        self._started_s = self._last_line_s = now()
+        self._has_asked = False
+        # Rich reads the environment on every access.
+        self._is_terminal = console.is_terminal
+        self._shown_s = -math.inf
+        super().__init__(
+            progress.TextColumn("{task.description}", markup=False),
+            progress.BarColumn(complete_style="cyan", finished_style="green"),
+            progress.MofNCompleteColumn(),
+            progress.TimeRemainingColumn(),
+            progress.TextColumn("{task.fields[facts]}", style="dim", markup=False),
+            console=console,
+            transient=True,
+            disable=not self._is_terminal,
+            get_time=now,
+        )
+
+    def __call__(self, event: RunEvent) -> None:
+        """Update the display for an event."""
+        of_model = isinstance(event, ModelEvent) and bool(event.model)
+        self._has_asked |= of_model or isinstance(event, SampleDone)
+        if isinstance(event, RunStarted):
+            for name, known in event.earlier.items():
+                number = self.add_task(
+                    one_line(name), total=event.expected, completed=len(known), facts=""
+                )
+                task = next(task for task in self.tasks if task.id == number)
+                self._tallies[name] = tally = Tally(task)
+                for sample in known:
+                    tally.add(sample)
+        elif isinstance(event, SampleDone):
+            tally = self._tallies[event.sample.model]
+            tally.add(event.sample)
+            self.advance(tally.task.id)
+        elif isinstance(event, ModelEvent) and event.kind == "retry":
+            tally = self._tallies[event.model]
+            tally.retries += 1
+            if tally.retries == 1:
+                wait = f"waiting {round(event.wait_s, 1):g} s; more are counted as sent again"
+                self._print(f"{event.model}: {event.message}; {wait}")
+        elif isinstance(event, ModelEvent) and event.kind == "stopped":
+            task = self._tallies[event.model].task
+            # Samples that will not be asked are not part of the total.
+            self.update(task.id, total=task.completed)
+            self._print(f"{event.model} stopped: {event.message}", style="red")
+        elif isinstance(event, ModelEvent):
+            self._print(f"{event.model}: {event.message}" if of_model else event.message)
+        else:
+            self._print(event.text)
+        if not isinstance(event, SampleDone) or self.get_time() - self._shown_s >= _SHOWN_EVERY_S:
+            self.tick()
+
+    def tick(self, asks: bool = False) -> None:
+        """Print due lines; called several times a second. `asks`: calls are in progress."""
+        self._shown_s = now_s = self.get_time()
+        self._has_asked |= asks
+        lasted = _duration(now_s - self._started_s)
+        preparing = "" if self._has_asked else f"Preparing scenes ... ({lasted})"
+        for tally in self._tallies.values():
+            self.update(tally.task.id, facts=preparing or tally.facts)
+        if not self._is_terminal and now_s - self._last_line_s >= _LINE_EVERY_S:
+            self._last_line_s = now_s
+            tallies = list(self._tallies.values())
+            done = sum(int(tally.task.completed) for tally in tallies)
+            total = sum(int(tally.task.total or 0) for tally in tallies)
+            failures = sum((tally.failures for tally in tallies), Counter[str]())
+            numbers = {name.replace("_", " "): n for name, n in sorted(failures.items())}
+            numbers["sent again"] = sum(tally.retries for tally in tallies)
+            facts = [f"{done:,} of {counted(total, 'sample')} after {lasted}"]
+            facts += [f"{n:,} {name}" for name, n in numbers.items() if n]
+            self._print(preparing or ", ".join(facts))
+
+    @property
+    def cost_text(self) -> str:
+        """Return the cost of the run so far, if prices are known."""
+        spent = sum(tally.cost_usd for tally in self._tallies.values())
+        unknown = any(tally.unpriced for tally in self._tallies.values())
+        return f"${spent:,.2f}" + (" and replies whose cost is not known" if unknown else "")
+
+    @property
+    def cached(self) -> int:
+        """Number of samples whose reply came from the cache."""
+        return sum(tally.cached for tally in self._tallies.values())
+
+    def _print(self, line: str, style: str = "") -> None:
+        """Print a line; a closed output must not end calls that cost money."""
+        with contextlib.suppress(OSError):
+            self.console.print(Text(one_line(line), style=style))
+
+
+def _duration(seconds: float) -> str:
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    if hours:
+        return f"{hours} h {minutes:02d} min"
+    return f"{minutes} min {rest:02d} s" if minutes else f"{rest} s"
 
 
 def print_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) -> None:
@@ -230,7 +352,7 @@ def print_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) ->
         "usual length. At most: every reply is as long as its limit allows."
     )
     title, notes = f"{plan.suite.name}: {', '.join(facts)}", (note,) if left else ()
-    print_table(console, TextTable(title, headings, lines, notes))
+    ui.print_table(console, TextTable(title, headings, lines, notes))
     known = [row.cost_usd for row in left if row.cost_usd is not None]
     costs = [f"about {_dollars(sum(known))}"] if known or not left else []
     if unknown := len(left) - len(known):
@@ -244,24 +366,24 @@ def _dollars(cost_usd: float | None) -> str:
     return f"${cost_usd:,.4f}" if 0 < cost_usd < 0.01 else f"${cost_usd:,.2f}"
 
 
-@click.command(epilog=f"Bundled suites: {', '.join(bundled_suites())}.")
-@click.argument("suite", type=NAME_OR_PATH)
+@click.command(epilog=f"Bundled suites: {', '.join(plans.bundled_suites())}.")
+@click.argument("suite", type=ui.NAME_OR_PATH)
 @click.option(
     "--name",
     required=True,
     metavar="NAME",
     help="Your name, human:NAME in tables: letters, digits, - and _; better not a real one.",
 )
-@sets_option
-@limit_option
+@ui.sets_option
+@ui.limit_option
 @click.option(
     "--beside",
-    type=UserPath(),
+    type=ui.UserPath(),
     multiple=True,
     metavar="RUN",
     help="Compare with the models of this run folder at the end.",
 )
-@run_out_option
+@ui.run_out_option
 @click.option("--port", type=click.IntRange(0, 65535), default=0, show_default="any free one")
 @click.option("--exact", is_flag=True, help="Show the models' prompt from the start, for studies.")
 @click.option("--no-browser", is_flag=True, help="Print the address; open no browser.")
@@ -284,21 +406,21 @@ def play(
     import webbrowser
 
     from phyblock.results.load import load_run
-    from phyblock.web.report import files_of, report_files
+    from phyblock.web.pages import files_of, report_files
     from phyblock.web.server import Server
     from phyblock.web.session import Ending, Person, PlaySession, plan_session
 
     person = Person(name, exact)
-    plan = plan_session(read_suite(suite, sets), person, limit)
+    plan = plan_session(plans.read_suite(suite, sets), person, limit)
     folder = out or plan.folder_in(Path("results"))
     if held_run(folder, plan.manifest) is not None:
         OutFolder(folder).check(files_of(page=True))
     for other in beside:
         load_run(other)
-    console = make_console()
+    console = ui.make_console()
 
     def begun() -> None:
-        print_path(console, f"Open {server.address}")
+        ui.print_path(console, f"Open {server.address}")
         console.print("Ctrl-C ends the session; the same command continues it.", style="dim")
         if not no_browser:
             # A terminal browser would block until it is closed.
@@ -309,12 +431,12 @@ def play(
         result = asyncio.run(session.run(plan, person, folder, begun))
         if result.left:
             console.print(f"{session.done:,} of {plan.samples_per_model:,} tasks are answered.")
-            print_again(console)
-            return INTERRUPTED
+            ui.print_again(console)
+            return ui.INTERRUPTED
         made = show_tables(folder, page=True)
         server.files = report_files(folder)
         session.finish(Ending(folder, person.model, beside, plan.dataset.tasks))
-        print_path(console, made)
+        ui.print_path(console, made)
         console.print("All tasks are done; the page shows the results. Ctrl-C ends.", style="dim")
         with contextlib.suppress(KeyboardInterrupt):
             server.finished.wait()
@@ -322,15 +444,11 @@ def play(
 
 
 @click.command()
-@run_argument
-@data_option
-@worker_options(1)
+@ui.run_argument
+@ui.data_option
+@ui.worker_options(1)
 def score(
-    run: Path,
-    data: Path | None,
-    jobs: int,
-    ray_address: str | None,
-    shard: tuple[int, int] | None,
+    run: Path, data: Path | None, jobs: int, ray_address: str | None, shard: tuple[int, int] | None
 ) -> None:
     """Parse and score the stored replies of the folder RUN again. Calls no model.
 
@@ -339,10 +457,10 @@ def score(
     from phyblock.run.rescore import rescore
 
     work = f"score {read_manifest(run).identity}: {code_versions()}\n"
-    shards = open_shards(shard, run, work)
+    shards = ui.open_shards(shard, run, work)
     with open_workers(jobs, ray_address, shards, size=64) as workers:
-        watch = partial(tracked, total=None, doing="Scoring")
-        rescore(run, data, make_console(stderr=True).print, watch, workers)
-    if left_to_first(shards, run):
+        watch = partial(ui.tracked, total=None, doing="Scoring")
+        rescore(run, data, ui.make_console(stderr=True).print, watch, workers)
+    if ui.left_to_first(shards, run):
         return
-    print_path(make_console(), show_tables(run, data=data))
+    ui.print_path(ui.make_console(), show_tables(run, data=data))

@@ -8,15 +8,7 @@ from pathlib import Path
 
 import click
 
-from phyblock.cli.console import (
-    UserPath,
-    make_console,
-    models_file_option,
-    print_path,
-    print_rows,
-    sets_option,
-    shown_path,
-)
+from phyblock.cli import console as ui
 from phyblock.config.models import GROUP, RECORDED, load_models, with_members
 from phyblock.config.suite import Suite, suite_model
 from phyblock.config.yaml import read_yaml
@@ -25,15 +17,7 @@ from phyblock.data.scenes import SCENES_FILE
 from phyblock.errors import InputError, Problem, SpecError
 from phyblock.files import bundled, check_free, reply_cache_file, writing
 from phyblock.registry import baseline_names
-from phyblock.run.plan import (
-    bundled_suites,
-    check_models,
-    find_models_file,
-    find_suite,
-    make_plan,
-    read_suite,
-    to_config,
-)
+from phyblock.run import plan as plans
 from phyblock.text import counted, did_you_mean
 from phyblock.tracks.base import kind_of
 
@@ -45,10 +29,10 @@ _FILES = (
 
 
 @click.command()
-@click.argument("folder", type=UserPath())
+@click.argument("folder", type=ui.UserPath())
 @click.option(
     "--suite",
-    type=click.Choice(bundled_suites()),
+    type=click.Choice(plans.bundled_suites()),
     default="quick",
     help="Bundled suite to begin with.",
 )
@@ -57,7 +41,7 @@ def init(folder: Path, suite: str) -> None:
 
     Never overwrites existing files.
     """
-    tracks = read_yaml(find_suite(suite)).data.get("tracks", ["full_planning"])
+    tracks = read_yaml(plans.find_suite(suite)).data.get("tracks", ["full_planning"])
     templates = [kind_of(name).template for name in tracks]
     prompts = [
         ("prompts", path.name)
@@ -67,33 +51,33 @@ def init(folder: Path, suite: str) -> None:
     names = (*_FILES, ("benchmarks", f"{suite}.yaml"), *prompts)
     files = [folder.joinpath(*parts) for parts in names]
     check_free(files, "choose another folder")
-    console = make_console()
+    console = ui.make_console()
     with writing(folder):
         for target, parts in zip(files, names, strict=True):
             target.parent.mkdir(parents=True, exist_ok=True)
             with target.open("xb") as file:
                 file.write(bundled(*parts).read_bytes())
-            print_path(console, f"  {shown_path(target)}")
+            ui.print_path(console, f"  {ui.shown_path(target)}")
     console.print(
         "\nAdd a model with one line in models.yaml, then name it under models in the suite. "
         "What you change under prompts/ is used by every run from here (NAME_json.j2 where a suite "
         "asks for JSON). Next:"
     )
-    place = shlex.quote(shown_path(folder))
-    print_path(console, f"  cd {place} && phyblock run benchmarks/{suite}.yaml")
+    place = shlex.quote(ui.shown_path(folder))
+    ui.print_path(console, f"  cd {place} && phyblock run benchmarks/{suite}.yaml")
 
 
 @click.command()
-@click.argument("files", nargs=-1, required=True, type=UserPath())
-@sets_option
-@models_file_option
+@click.argument("files", nargs=-1, required=True, type=ui.UserPath())
+@ui.sets_option
+@ui.models_file_option
 def validate(files: tuple[Path, ...], sets: tuple[str, ...], models_file: str | None) -> None:
     """Check FILES: suites (or names of bundled ones) and models files, data set folders, official
     checkouts.
 
     Shows all problems of all files; exits with 2 if there are any.
     """
-    console = make_console()
+    console = ui.make_console()
     problems: list[Problem] = []
     for path in files:
         try:
@@ -101,7 +85,7 @@ def validate(files: tuple[Path, ...], sets: tuple[str, ...], models_file: str | 
         except InputError as error:
             problems += error.problems
         else:
-            console.print(f"{shown_path(path)}: {summary}")
+            console.print(f"{ui.shown_path(path)}: {summary}")
     if problems:
         raise InputError(problems)
 
@@ -116,21 +100,21 @@ def _check(path: Path, sets: tuple[str, ...], models_file: str | None) -> str:
         )
         scenes = counted(len(dataset.tasks), "scene")
         return f"data set {dataset.name}, {scenes} ({by_level})"
-    path = find_suite(str(path))
+    path = plans.find_suite(str(path))
     data = read_yaml(path).data
     if isinstance(data, dict) and data.keys() & suite_model().model_fields.keys():
-        suite = read_suite(str(path), sets)
-        named = find_models_file(models_file, path)
+        suite = plans.read_suite(str(path), sets)
+        named = plans.find_models_file(models_file, path)
         known = load_models(named)
         asked = () if suite.models == RECORDED else suite.models
         names = [name for name in with_members(asked, known) if name in known]
-        check_models([known[name] for name in names], read_yaml(named))
-        plan = make_plan(suite, known)
-        models = counted(len(plan.models), "model")
-        samples = f"{counted(plan.samples_per_model, 'sample')} a model"
+        plans.check_models([known[name] for name in names], read_yaml(named))
+        planned = plans.make_plan(suite, known)
+        models = counted(len(planned.models), "model")
+        samples = f"{counted(planned.samples_per_model, 'sample')} a model"
         return f"suite {suite.name}, {models}, {samples}"
     known = load_models(path)
-    check_models(known.values(), read_yaml(path))
+    plans.check_models(known.values(), read_yaml(path))
     if not known:
         allowed = "a suite, or a models file with name: provider/model lines"
         raise SpecError(Problem(str(path), "is empty", allowed=allowed))
@@ -138,19 +122,19 @@ def _check(path: Path, sets: tuple[str, ...], models_file: str | None) -> str:
 
 
 @click.command()
-@models_file_option
+@ui.models_file_option
 def models(models_file: str | None) -> None:
     """List the models that suites may name."""
     from phyblock.models.client import api_key_status
     from phyblock.models.costs import tariff_of
 
-    path = find_models_file(models_file, None)
+    path = plans.find_models_file(models_file, None)
     known = load_models(path)
-    console = make_console()
+    console = ui.make_console()
     rows: list[tuple[str, ...]] = []
     suite = Suite(name="models", models=("random",))
     for name, entry in known.items():
-        if (config := to_config(name, entry, suite)).kind != "litellm":
+        if (config := plans.to_config(name, entry, suite)).kind != "litellm":
             rows.append((name, str(config.recording), "", "0, 0"))
             continue
         status, tariff = api_key_status(config), tariff_of(config)
@@ -158,8 +142,8 @@ def models(models_file: str | None) -> None:
         key = "set" if status.key else key
         price = f"{tariff.input:.10g}, {tariff.output:.10g}" if tariff else "unknown"
         rows.append((name, config.id, key, price))
-    print_rows(console, ("model", "id", "key", "$/M in, out"), rows, numbers=1)
-    console.print(f"{counted(len(known), 'model')} in {shown_path(path)}")
+    ui.print_rows(console, ("model", "id", "key", "$/M in, out"), rows, numbers=1)
+    console.print(f"{counted(len(known), 'model')} in {ui.shown_path(path)}")
     for group in dict.fromkeys(group for config in known.values() for group in config.groups):
         members = ", ".join(with_members([GROUP + group], known))
         console.print(f"{GROUP}{group}: {members}")
@@ -172,7 +156,7 @@ def cache(clear: str | None) -> None:
     """List the replies in the reply cache, which all runs of this user share, by model id."""
     from phyblock.models.cache import ReplyCache
 
-    console, path = make_console(), reply_cache_file()
+    console, path = ui.make_console(), reply_cache_file()
     with ReplyCache(path) as opened:
         counts = opened.counts()
         if clear is not None:
@@ -183,7 +167,7 @@ def cache(clear: str | None) -> None:
             click.confirm(f"Delete {which}? The same calls are billed again.", abort=True)
             opened.clear(clear)
     rows = [(model, f"{number:,}") for model, number in counts.items()]
-    print_rows(console, ("model", "replies"), rows, numbers=1)
+    ui.print_rows(console, ("model", "replies"), rows, numbers=1)
     total = counted(sum(counts.values()), "reply", "replies")
     console.print(f"{total}, {path.stat().st_size / 1e6:,.1f} MB, in")
-    print_path(console, path)
+    ui.print_path(console, path)

@@ -282,11 +282,7 @@ SHAPES: dict[BlockType, Shape] = {
         kit_colors=("orange",),
         word="cylinder",
         mistaken_for=("semi_cylinder",),
-        poses={
-            **_turns("upright"),
-            "lying-x": (90.0, 0.0, 90.0),
-            "lying-y": (90.0, 0.0, 0.0),
-        },
+        poses={**_turns("upright"), "lying-x": (90.0, 0.0, 90.0), "lying-y": (90.0, 0.0, 0.0)},
     ),
     "semi_cylinder": Shape(
         profile=_half_disc(0.025, 10),

@@ -34,26 +34,10 @@ from phyblock.files import bundled
 from phyblock.models.request import Image as SentImage
 from phyblock.scoring.pose import blocks_reached
 from phyblock.scoring.steps import Assembly, Move
-from phyblock.sim.dynamics import (
-    DEFAULT_TRIAL,
-    ONE_SETTING,
-    ExecutedStep,
-    Executor,
-    Settled,
-    execution_physics,
-    settle,
-)
+from phyblock.sim import dynamics, pictures
+from phyblock.sim.dynamics import ExecutedStep, Executor, Settled
 from phyblock.sim.geometry import center_cm, put
-from phyblock.sim.pictures import (
-    LARGEST_PX,
-    SMALLEST_PX,
-    Lookout,
-    PictureStyle,
-    RuledFloor,
-    candidates_grid,
-    goal_style,
-    kit_sheet,
-)
+from phyblock.sim.pictures import Lookout, PictureStyle, RuledFloor
 from phyblock.tracks.pictures import LocalShop
 from phyblock.tracks.step_planning import PastStep, StepOutcome, StepPlanning
 from phyblock.types import GATINGS, SETTINGS, Background, Gating, Physics, Setting
@@ -102,7 +86,7 @@ class _BlockPlay:
         self.action_space = spaces.Discrete(MAX_CANDIDATES + 1)
         self._style, self._setting, self._gating = style, setting, gating
         self._physics, self._is_strict = physics, physics == "strict"
-        self._trial = DEFAULT_TRIAL if self._is_strict else ONE_SETTING
+        self._trial = dynamics.DEFAULT_TRIAL if self._is_strict else dynamics.ONE_SETTING
         self._task: AssemblyTask | None = None
 
     def begin(self, task: AssemblyTask) -> None:
@@ -123,7 +107,7 @@ class _BlockPlay:
         if is_placed:
             state = tuple(self._scene.blocks[vertex] for vertex in self._assembly.vertices)
             is_off = self._physics == "off"
-            settled = Settled((), state) if is_off else settle(state, self._trial)
+            settled = Settled((), state) if is_off else dynamics.settle(state, self._trial)
             # Blocks that fall are held at their goal poses, or stay fallen under `strict`.
             self._settled = settled if self._is_strict else Settled(settled.fallen, state)
         return self._move.outcome, float(is_placed), is_placed
@@ -146,7 +130,7 @@ class _BlockPlay:
     def image(self, blocks: tuple[Block, ...] | None) -> Image.Image:
         """Blocks in the world, or the candidates for None."""
         if blocks is None:
-            return candidates_grid(self.candidates, self._style)[0]
+            return pictures.candidates_grid(self.candidates, self._style)[0]
         if self._lookout is None:
             self._lookout = Lookout(self._scene, self._style)
         return self._lookout.image(blocks)
@@ -183,7 +167,7 @@ class _PosePlay:
             self._floor: RuledFloor | None = None
         self._stack.close()
         self._executor = self._stack.enter_context(
-            Executor(physics=execution_physics(self._scene.blocks))
+            Executor(physics=dynamics.execution_physics(self._scene.blocks))
         )
         self._last: ExecutedStep | None = None
         self._named: list[int] = []
@@ -238,9 +222,9 @@ class _PosePlay:
     def image(self, blocks: tuple[Block, ...] | None) -> Image.Image:
         """Blocks in the world, or the candidates for None."""
         if blocks is None:
-            return kit_sheet(self.candidates, self._style)
+            return pictures.kit_sheet(self.candidates, self._style)
         if self._floor is None:
-            self._floor = RuledFloor(self._scene, goal_style(self._scene, self._style))
+            self._floor = RuledFloor(self._scene, pictures.goal_style(self._scene, self._style))
         return self._floor.image(blocks)
 
     def info(self) -> dict[str, Any]:
@@ -316,8 +300,8 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
         for name, most in {"max_steps": max_steps, "max_failures": max_failures}.items():
             if most is not None and most < 1:
                 raise ValueError(f"{name} is {most}; allowed: 1 or more, or None")
-        if not _SMALLEST_PX <= size_px <= LARGEST_PX:
-            raise ValueError(f"size_px is {size_px}, allowed {_SMALLEST_PX}..{LARGEST_PX}")
+        if not _SMALLEST_PX <= size_px <= pictures.LARGEST_PX:
+            raise ValueError(f"size_px is {size_px}, allowed {_SMALLEST_PX}..{pictures.LARGEST_PX}")
         tasks = read_data_set(str(data)).tasks if isinstance(data, str | Path) else tuple(data)
         if levels is not None:
             if not isinstance(levels, Collection) or not set(levels) <= set(_LEVELS):
@@ -329,7 +313,7 @@ class PhyBlockEnv(gymnasium.Env[Observation, Any]):
         self._scene = None if scene is None else self._data.task(scene).key
         self._observe = observe
         # Below the smallest drawn size, whole pixels are combined.
-        self._shrink = max(1, -(-SMALLEST_PX // size_px))
+        self._shrink = max(1, -(-pictures.SMALLEST_PX // size_px))
         style = PictureStyle(size_px * self._shrink, background)
         self._task = tasks[0]
         self._play: _BlockPlay | _PosePlay = (

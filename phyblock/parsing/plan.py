@@ -17,13 +17,7 @@ from functools import cached_property, lru_cache
 from typing import Any, Literal
 
 from phyblock.domain.scene import Plan, PoseStep
-from phyblock.parsing.text import (
-    AnswerForm,
-    answer_of,
-    is_open,
-    plain_lines,
-    whole_number,
-)
+from phyblock.parsing.text import AnswerForm, answer_of, is_open, plain_lines, whole_number
 from phyblock.types import PlanParser
 
 _REPLIES_KEPT = 1024
@@ -127,16 +121,16 @@ _WORDS = r"\b(?:block|candidate|piece|index(?:es)?|indices|idx|number|no|id)s?\.
 _NAMED = re.compile(rf"(?:{_WORDS}[ :=#\"'(\[{{<-]{{0,6}}|#)(\d{{1,6}})(?!\w|\.\d)", re.I)
 _MORE = re.compile(
     r"(?i) ?(?:\([^()\n]{0,80}\) ?)?(?:, ?and |, ?|& ?|\+ ?|and )(?:(?:the|another) )?"
-    rf"(?:(?:{_WORDS}|#) ?){{0,3}}(\d{{1,6}})(?![\w/]|\.\d| [a-z]+s\b)",
+    rf"(?:(?:{_WORDS}|#) ?){{0,3}}(\d{{1,6}})(?![\w/]|\.\d| [a-z]+s\b)"
 )
 _VERB = r"(?:move|place|put|add|set|position|stack|insert|use|take|attach|lay|pick)\b"
 _BARE = re.compile(
     rf"(?i)\W{{0,9}}(?:{_VERB})?[^\w\n]{{0,9}}(\d{{1,6}})(?!\w|\.\d)\W{{0,3}}(?:[(|].{{0,200}})?\Z"
-    r"|[^\d\n]{1,200}[(\[{]#?(\d{1,6})[)\]}][^\d\n]{0,200}\Z",
+    r"|[^\d\n]{1,200}[(\[{]#?(\d{1,6})[)\]}][^\d\n]{0,200}\Z"
 )
 _TIMES = re.compile(
     r"(?i)\btwice\b|(?<!\w)(?<![\d.] )[x\u00d7] ?([2-9])(?=\)|\W{0,9}\Z)"
-    rf"|([2-9]) ?[x\u00d7] ?(?={_WORDS}|#)",
+    rf"|([2-9]) ?[x\u00d7] ?(?={_WORDS}|#)"
 )
 
 
@@ -179,11 +173,11 @@ _LABEL = re.compile(r"(?<![\w\n])(?=steps?[ #-]{0,3}\d{1,4}[\"')\]]{0,2} ?[:=])"
 _STEP = re.compile(
     r"(?i)[^\w\n]{0,20}(?:\d{1,3}[.)]\W{0,9})?steps?[ #-]{0,3}(\d{1,4})"
     r"((?: ?(?:, ?and|&|and|to|,|[-\u2013]) ?(?:step ?)?\d{1,4}){0,9})(?!\w)"
-    r"[\"')\]]{0,3}\s{0,9}[:.)=|>,\u2013-]{0,3}(.*)",
+    r"[\"')\]]{0,3}\s{0,9}[:.)=|>,\u2013-]{0,3}(.*)"
 )
 _ITEM = re.compile(
     r"(?i)[\s>]{0,40}(?:[-*\u2022+|]\s{0,9})?\(?(\d{1,3})\s?[.):|\]]\s{0,9}(.*)"
-    rf"|[\s>]{{0,40}}[-*\u2022+]\s{{1,9}}(.*)|[\s>]{{0,40}}({_VERB}.*)",
+    rf"|[\s>]{{0,40}}[-*\u2022+]\s{{1,9}}(.*)|[\s>]{{0,40}}({_VERB}.*)"
 )
 _ACTS = re.compile(rf"[\W\d]{{0,20}}{_VERB}", re.I)
 _WORD = re.compile(r"[^\W\d]")
@@ -277,11 +271,11 @@ def _with_titles(runs: list[list[Item]], lines: list[str]) -> list[StepList]:
 # --- the plan among lists ---
 
 _PART = re.compile(
-    r"(?i)\b(?:left|right|structure|construction|configuration|layer|level|part|section|side|stage)\b",
+    r"(?i)\b(?:left|right|structure|construction|configuration|layer|level|part|section|side|stage)\b"
 )
 _WHOLE = re.compile(
     r"(?i)\b(?:final|correct|revis|updat|improv|optimi|alternat|option|instead|again|whole|complete"
-    r"|full|overall|combined|entire|summary|both)",
+    r"|full|overall|combined|entire|summary|both)"
 )
 _PLAN = re.compile(
     r"\b(?:plan|order|sequence|assembl|steps?|instruction|answer|solution|output|result)", re.I
@@ -339,7 +333,7 @@ def _is_part(one: StepList, plan: list[StepList]) -> bool:
 _SEQUENCE = r"(\d{1,6}+(?:(?:[\s,;\"'#>\u2192-]|block|index){1,9}+\d{1,6}+){1,64}+)[\s)\]\"'.,}]*+"
 _NUMBERS = re.compile(
     r"(?i)\b(?:plan|order|sequence|steps|answer|solution|assembly)\b([^\d\n]{0,60}+)"
-    rf"{_SEQUENCE}(?:\(.*)?\Z",
+    rf"{_SEQUENCE}(?:\(.*)?\Z"
 )
 _ALONE = re.compile(rf"\W{{0,9}}+{_SEQUENCE}\Z")
 
@@ -420,16 +414,16 @@ def parse_poses(text: str, n_candidates: int) -> ParsedPoses:
 
 _BLOCK = re.compile(
     r"(?i)\b(?:block|candidate|index|number|id)\b[ #:=\"']{0,4}(?:with index )?(-?\d{1,6})(?![.\d])"
-    r"|\W{0,9}(-?\d{1,6})(?![.,]?\d)",
+    r"|\W{0,9}(-?\d{1,6})(?![.,]?\d)"
 )
 _OTHERS = re.compile(r"\b(?:block|step|candidate|layer|level)s? ?#?\d{1,6}(?![.\d])", re.I)
 _VALUE = re.compile(
     r"(?i)(?:(?<![a-z])([xyz])\"? ?[=:] ?)?(?<![\w.])"
     r"([+-]?(?:\d{1,9}(?:\.\d{0,12})?|\.\d{1,9})(?:e[+-]?\d{1,3})?)(?![\d.])"
-    r" ?(?:(?:and|then|at|by|with|on|is|to)\b|([a-z%\"'\u2032\u2033]{1,12}))?",
+    r" ?(?:(?:and|then|at|by|with|on|is|to)\b|([a-z%\"'\u2032\u2033]{1,12}))?"
 )
 _UNIT = re.compile(
-    r"(?i)[)\]] ?(?:in )?([cm]?m|(?:centi|milli)?met(?:er|re)s?|inch(?:es)?|ft|feet|px|units?)\b",
+    r"(?i)[)\]] ?(?:in )?([cm]?m|(?:centi|milli)?met(?:er|re)s?|inch(?:es)?|ft|feet|px|units?)\b"
 )
 _CM = {"": 1.0, "cm": 1.0, "mm": 0.1, "m": 100.0}
 _LONG = re.compile(r"(?<=^[cm])(?:enti|illi)|et(?:er|re)s?$")  # What a short unit leaves out.

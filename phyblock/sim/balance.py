@@ -27,21 +27,9 @@ from numpy.typing import NDArray
 from phyblock.domain.blocks import FRICTION, SHAPES
 from phyblock.domain.scene import Block
 from phyblock.errors import PhyblockError
-from phyblock.sim import certificate
+from phyblock.sim import certificate, contact
 from phyblock.sim.certificate import Body, Contact, Falls, Stands, Structure
-from phyblock.sim.contact import (
-    CONTACT_TOLERANCE_M,
-    FIT_TOLERANCE_M,
-    Turned,
-    at,
-    beside,
-    bounds_m,
-    boxes_near,
-    contact_corners_m,
-    find_overlaps,
-    piece_pairs,
-    pieces_of,
-)
+from phyblock.sim.contact import Turned
 from phyblock.sim.geometry import centers_m, cross
 
 Floats = NDArray[np.float64]
@@ -100,7 +88,7 @@ class Proven(NamedTuple):
 
 def prove_standing(blocks: Sequence[Block]) -> Proven | None:
     """Return a checked proof that blocks stand, or None."""
-    if not blocks or find_overlaps(blocks):
+    if not blocks or contact.find_overlaps(blocks):
         return None
     if (borne := _borne(blocks)) is None:
         return None
@@ -119,7 +107,7 @@ def prove(blocks: Sequence[Block]) -> Proven | None:
 
     Nothing is proven about blocks that overlap, since they push one another apart.
     """
-    if (standing := prove_standing(blocks)) or not blocks or find_overlaps(blocks):
+    if (standing := prove_standing(blocks)) or not blocks or contact.find_overlaps(blocks):
         return standing
     wide = _contacts(blocks, -MARGIN_M)
     solution = _least_imbalance(blocks, _matrix(wide, len(blocks), _MUCH))
@@ -274,10 +262,12 @@ def _contacts(blocks: Sequence[Block], margin_m: float = 0.0) -> _Contacts:
         for corners in _on_floor(b)
     ]
     for (below, one), (above, other) in combinations(enumerate(blocks), 2):
-        if boxes_near(bounds_m(one), bounds_m(other), CONTACT_TOLERANCE_M):
+        if contact.boxes_near(
+            contact.bounds_m(one), contact.bounds_m(other), contact.CONTACT_TOLERANCE_M
+        ):
             found += [
                 (below, above, corners + one.position_m, normal)
-                for corners, normal in _between(*beside(one, other), margin_m)
+                for corners, normal in _between(*contact.beside(one, other), margin_m)
             ]
     axes = []
     for *_, corners, normal in found:
@@ -333,10 +323,10 @@ def _stated(met: _Contacts) -> tuple[Contact, ...]:
 @functools.lru_cache(maxsize=_KEPT)
 def _on_floor(block: Block) -> tuple[Floats, ...]:
     """Corners of a block's contact with the ground; empty if there is none."""
-    points = np.vstack([piece.vertices_m for piece in pieces_of(block)])
-    if points[:, 2].min() >= CONTACT_TOLERANCE_M:
+    points = np.vstack([piece.vertices_m for piece in contact.pieces_of(block)])
+    if points[:, 2].min() >= contact.CONTACT_TOLERANCE_M:
         return ()
-    foot = points[points[:, 2] < points[:, 2].min() + CONTACT_TOLERANCE_M]
+    foot = points[points[:, 2] < points[:, 2].min() + contact.CONTACT_TOLERANCE_M]
     # The outermost points in sixteen directions.
     angles = np.arange(16) * math.pi / 8 + 0.01
     reach = foot[:, :2] @ np.stack([np.cos(angles), np.sin(angles)])
@@ -349,10 +339,10 @@ def _between(
 ) -> tuple[tuple[Floats, Floats], ...]:
     """Corners of the contacts of two blocks from the first one's place, and normals from it."""
     met, is_wide = [], margin_m < 0
-    for first, second, axes in piece_pairs(at(one), at(other, way_m)):
+    for first, second, axes in contact.piece_pairs(contact.at(one), contact.at(other, way_m)):
         # A balance must not press on a block across a gap; a fall allows for all that may touch.
-        most_m = CONTACT_TOLERANCE_M if is_wide else FIT_TOLERANCE_M
-        if not -2 * CONTACT_TOLERANCE_M <= axes.gap_m <= most_m:
+        most_m = contact.CONTACT_TOLERANCE_M if is_wide else contact.FIT_TOLERANCE_M
+        if not -2 * contact.CONTACT_TOLERANCE_M <= axes.gap_m <= most_m:
             continue
         near_m = _NEARLY_SAME_M if is_wide else _SAME_GAP_M
         best = axes.directions[axes.gaps_m > axes.gap_m - near_m]
@@ -361,7 +351,7 @@ def _between(
             best = best[[int(np.argmax(np.abs(best[:, 2])))]]
             best = best[np.abs(best[:, 2]) >= _LEAST_VERTICAL]
         for direction in np.unique(best.round(9), axis=0) if is_wide else best:
-            corners = contact_corners_m(first, second, direction, margin_m)
+            corners = contact.contact_corners_m(first, second, direction, margin_m)
             if len(corners):
                 met.append((corners, direction))
     return tuple(met)

@@ -27,22 +27,11 @@ from PIL import Image, ImageDraw, ImageFont
 from phyblock.domain.blocks import SHAPES, BlockType, Color, Euler, euler_deg_to_matrix
 from phyblock.domain.scene import Block, CandidateSet, Scene
 from phyblock.errors import DataError, Problem
+from phyblock.sim import raster
 from phyblock.sim.backgrounds import DARK_INK, GROUNDS, INK_RGB, LIGHT_INK, floor, shadow
 from phyblock.sim.engine import Pose
 from phyblock.sim.geometry import dot, drawn_mesh, rounded, turned
-from phyblock.sim.raster import (
-    RASTER_VERSION,
-    VIEWS,
-    Camera,
-    Light,
-    Prop,
-    Raster,
-    Rgb,
-    Window,
-    draw,
-    frame,
-    view_axes,
-)
+from phyblock.sim.raster import Camera, Light, Prop, Raster, Rgb, Window
 from phyblock.text import hex_digest
 from phyblock.types import BACKGROUNDS, Background, View
 
@@ -98,10 +87,10 @@ def picture(
     """Blocks on their floor, or on a `ground` from `empty_ground`, anti-aliased, RGB."""
     image = empty_ground(background, camera, size_px) if ground is None else ground.copy()
     if blocks:
-        raster = _raster(blocks, camera, size_px * SUPERSAMPLE)
-        image *= shadow(background, raster.shaded)
-        np.copyto(image, raster.rgb, where=raster.prop[..., None] >= 0)
-        image = draw_outlines(image, raster, background)
+        drawing = _raster(blocks, camera, size_px * SUPERSAMPLE)
+        image *= shadow(background, drawing.shaded)
+        np.copyto(image, drawing.rgb, where=drawing.prop[..., None] >= 0)
+        image = draw_outlines(image, drawing, background)
     pixels = np.rint(image, out=image).astype(np.uint8)
     return Image.fromarray(pixels).resize((size_px, size_px), Image.Resampling.BOX)
 
@@ -121,19 +110,19 @@ class Shot:
 
 def shoot(blocks: Sequence[Block], camera: Camera, size_px: int) -> Shot:
     """Draw blocks without a floor, at exactly `size_px` and without anti-aliasing."""
-    raster = _raster(blocks, camera, size_px)
-    return Shot(draw_outlines(raster.rgb, raster, None), raster.prop)
+    drawing = _raster(blocks, camera, size_px)
+    return Shot(draw_outlines(drawing.rgb, drawing, None), drawing.prop)
 
 
 def segments(blocks: Sequence[Block], camera: Camera, size_px: int) -> NDArray[np.int64]:
     """The 0-based number of the block in each pixel, shape (size, size), -1 for none."""
     light = Light(np.array([0.0, 0.0, 1.0]), 1.0, 0.0)
-    return draw(props_of(blocks), camera, light, size_px).prop
+    return raster.draw(props_of(blocks), camera, light, size_px).prop
 
 
 def _raster(blocks: Sequence[Block], camera: Camera, size_px: int) -> Raster:
     light = Light(light_direction(camera), _AMBIENT, _DIFFUSE)
-    return draw(props_of(blocks), camera, light, size_px)
+    return raster.draw(props_of(blocks), camera, light, size_px)
 
 
 def props_of(blocks: Sequence[Block]) -> list[Prop]:
@@ -152,14 +141,14 @@ def light_direction(camera: Camera) -> NDArray[np.float64]:
 
 
 def draw_outlines(
-    image: NDArray[Pixel], raster: Raster, background: Background | None
+    image: NDArray[Pixel], drawing: Raster, background: Background | None
 ) -> NDArray[Pixel]:
-    """A picture (size, size, 3) of a raster with lines where faces, and blocks, end."""
+    """A picture (size, size, 3) of a drawing with lines where faces, and blocks, end."""
     lined: NDArray[Pixel] = image.copy()
-    lined[_ends(raster.face, raster.prop) & (raster.prop >= 0)] = INK_RGB
+    lined[_ends(drawing.face, drawing.prop) & (drawing.prop >= 0)] = INK_RGB
     if background is not None:
-        rim = _ends(raster.prop >= 0)
-        lined[rim | _ends(rim) & (raster.prop < 0)] = GROUNDS[background].rim
+        rim = _ends(drawing.prop >= 0)
+        lined[rim | _ends(rim) & (drawing.prop < 0)] = GROUNDS[background].rim
     return lined
 
 
@@ -202,8 +191,8 @@ class PictureStyle:
 
     size_px: int = 512
     background: Background = "checkerboard"
-    azimuth_deg: float = VIEWS["oblique"][0]
-    elevation_deg: float = VIEWS["oblique"][1]
+    azimuth_deg: float = raster.VIEWS["oblique"][0]
+    elevation_deg: float = raster.VIEWS["oblique"][1]
 
     def __post_init__(self) -> None:
         ranges = {"size_px": (SMALLEST_PX, LARGEST_PX), "elevation_deg": (1, 90)}
@@ -220,14 +209,14 @@ class PictureStyle:
         cls, view: View, size_px: int = 512, background: Background = "checkerboard"
     ) -> PictureStyle:
         """The style of a named view (front, side, top, oblique); ValueError for another name."""
-        if view not in VIEWS:
-            raise ValueError(f"view is {view!r}, allowed {', '.join(sorted(VIEWS))}")
-        return cls(size_px, background, *VIEWS[view])
+        if view not in raster.VIEWS:
+            raise ValueError(f"view is {view!r}, allowed {', '.join(sorted(raster.VIEWS))}")
+        return cls(size_px, background, *raster.VIEWS[view])
 
     @property
     def axes(self) -> NDArray[np.float64]:
         """Right, up and forward of the view, rows of a (3, 3) array."""
-        return view_axes(self.azimuth_deg, self.elevation_deg)
+        return raster.view_axes(self.azimuth_deg, self.elevation_deg)
 
 
 def goal_png(scene: Scene, style: PictureStyle) -> bytes:
@@ -238,8 +227,7 @@ def goal_png(scene: Scene, style: PictureStyle) -> bytes:
 
 def candidates_png(candidates: CandidateSet, style: PictureStyle) -> bytes:
     """PNG of the numbered candidates, square, 4 by 4 cells, in the goal's view."""
-    grid, _, _ = candidates_grid(candidates, style)
-    return to_png(grid)
+    return to_png(candidates_grid(candidates, style)[0])
 
 
 def composite_png(goal: bytes, candidates: bytes) -> bytes:
@@ -288,7 +276,7 @@ def picture_key(kind: str, style: PictureStyle, content: Iterable[object]) -> st
 
 def pixel_versions() -> dict[str, str]:
     """Versions of the rasterizer, and of Pillow for text, lines, scaling and PNG."""
-    return {"raster": RASTER_VERSION, "pillow": PIL.__version__}
+    return {"raster": raster.RASTER_VERSION, "pillow": PIL.__version__}
 
 
 def goal_camera(scene: Scene, style: PictureStyle) -> Camera:
@@ -313,7 +301,8 @@ def camera_for(
     if not blocks:
         raise DataError(Problem(where=where, field="blocks", message="there is none to draw"))
     points, more = (np.vstack([drawn_m(b) for b in some]) for some in (blocks, shown or blocks))
-    return frame(points, style.axes, _GOAL_WINDOW, _GOAL_MIN_DISTANCE_M, more if shown else None)
+    drawn = more if shown else None
+    return raster.frame(points, style.axes, _GOAL_WINDOW, _GOAL_MIN_DISTANCE_M, drawn)
 
 
 class Lookout:
@@ -380,7 +369,7 @@ def candidate_camera(block: Block, style: PictureStyle, distance_m: float | None
     if distance_m is None:
         return close_camera(block, style, _CELL_WINDOW)
     nearest_m = distance_m - _half_depth_m(block, style)
-    return frame(drawn_m(block), style.axes, _CELL_WINDOW, nearest_m)
+    return raster.frame(drawn_m(block), style.axes, _CELL_WINDOW, nearest_m)
 
 
 def close_camera(block: Block, style: PictureStyle, window: Window) -> Camera:
@@ -391,14 +380,14 @@ def close_camera(block: Block, style: PictureStyle, window: Window) -> Camera:
     half_x, half_y = (window.right - window.left) / 2, (window.top - window.bottom) / 2
     half_x, half_y = half_x * share, half_y * share
     seen = Window(x - half_x, x + half_x, y - half_y, y + half_y)
-    return frame(drawn_m(block), style.axes, seen)
+    return raster.frame(drawn_m(block), style.axes, seen)
 
 
 def common_distance_m(blocks: Iterable[Block], style: PictureStyle) -> float:
     """The least distance from the center of each block [m] at which all fit their cells."""
     axes, needed = style.axes, [0.0]
     for block in blocks:
-        closest = frame(drawn_m(block), axes, _CELL_WINDOW)
+        closest = raster.frame(drawn_m(block), axes, _CELL_WINDOW)
         nearest_m = float(dot(drawn_m(block) - closest.eye_m, axes[2]).min())
         needed.append(nearest_m + _half_depth_m(block, style))
     return max(needed)
@@ -531,7 +520,7 @@ def _ruled_camera(blocks: Sequence[Block], field: _Field, style: PictureStyle) -
         marks.append((*field.far, field.z + 2.0))
     corners = np.array(marks, dtype=np.float64) / _CM
     points = np.vstack([*(drawn_m(block) for block in blocks), corners])
-    return frame(points, style.axes, _RULED_WINDOW, _LEAST_DISTANCE_M)
+    return raster.frame(points, style.axes, _RULED_WINDOW, _LEAST_DISTANCE_M)
 
 
 class _Pen:

@@ -20,21 +20,9 @@ from PIL import Image, ImageDraw, ImageFont
 
 from phyblock.domain.question import Mark, QuestionPicture
 from phyblock.domain.scene import Block, Scene
+from phyblock.sim import pictures
 from phyblock.sim.geometry import drawn_mesh
-from phyblock.sim.pictures import (
-    RENDER_VERSION,
-    PictureStyle,
-    Shot,
-    camera_for,
-    close_camera,
-    drawn_m,
-    looks,
-    on_the_floor,
-    picture,
-    pixel_versions,
-    shoot,
-    to_png,
-)
+from phyblock.sim.pictures import PictureStyle, Shot
 from phyblock.sim.raster import HALF_TANGENT, Camera, Window
 from phyblock.text import hex_digest
 
@@ -69,8 +57,8 @@ def question_png(recipe: QuestionPicture, style: PictureStyle) -> bytes:
     """PNG of a question's picture, square; its view, and background if any, replace the style's."""
     camera = question_camera(recipe, style)
     ground = recipe.background or style.background
-    image = picture(drawn_blocks(recipe), camera, ground, style.size_px)
-    return to_png(_with_marks(image, recipe.marks, camera) if recipe.marks else image)
+    image = pictures.picture(drawn_blocks(recipe), camera, ground, style.size_px)
+    return pictures.to_png(_with_marks(image, recipe.marks, camera) if recipe.marks else image)
 
 
 @functools.lru_cache(maxsize=48)
@@ -80,15 +68,15 @@ def question_camera(recipe: QuestionPicture, style: PictureStyle) -> Camera:
     seen_from = replace(style, azimuth_deg=azimuth_deg, elevation_deg=elevation_deg)
     shown = drawn_blocks(recipe)
     if _is_alone(recipe):
-        return close_camera(shown[0], seen_from, _BLOCK_WINDOW)
-    return camera_for(recipe.framed or shown, seen_from, recipe.label, shown)
+        return pictures.close_camera(shown[0], seen_from, _BLOCK_WINDOW)
+    return pictures.camera_for(recipe.framed or shown, seen_from, recipe.label, shown)
 
 
 def drawn_blocks(recipe: QuestionPicture) -> Sequence[Block]:
     """The blocks as drawn; a single block (label `block`) lies on the floor."""
     if _is_alone(recipe):
         only = recipe.blocks[0]
-        return [on_the_floor(only.type, only.color, only.euler_deg)]
+        return [pictures.on_the_floor(only.type, only.color, only.euler_deg)]
     return recipe.blocks
 
 
@@ -106,13 +94,13 @@ def question_key(recipe: QuestionPicture, style: PictureStyle) -> str:
     """SHA-256 [hex] of everything the picture depends on, so that equal pictures share a file."""
     parts = {
         "kind": "question",
-        "render_version": [RENDER_VERSION, QUESTION_RENDER_VERSION],
-        **pixel_versions(),
+        "render_version": [pictures.RENDER_VERSION, QUESTION_RENDER_VERSION],
+        **pictures.pixel_versions(),
         "style": [style.size_px, recipe.background or style.background],
         "view": list(recipe.view_deg),
         "alone": _is_alone(recipe),
-        "blocks": looks(drawn_blocks(recipe)),
-        "framed": looks(recipe.framed),
+        "blocks": pictures.looks(drawn_blocks(recipe)),
+        "framed": pictures.looks(recipe.framed),
         "marks": [[mark.letter, *mark.position_m] for mark in recipe.marks],
     }
     return hex_digest(json.dumps(parts, sort_keys=True, allow_nan=False))
@@ -204,7 +192,7 @@ def _label_places(centers: Sequence[Point], radius: float, size_px: int) -> list
 @functools.lru_cache(maxsize=48)
 def seen(recipe: QuestionPicture) -> Shot:
     """The blocks of a picture from its camera, `SEEN_PX` squared, without floor and marks."""
-    return shoot(drawn_blocks(recipe), question_camera(recipe, _STYLE), SEEN_PX)
+    return pictures.shoot(drawn_blocks(recipe), question_camera(recipe, _STYLE), SEEN_PX)
 
 
 def changed_pixels(one: Shot, other: Shot) -> NDArray[np.bool_]:
@@ -239,7 +227,7 @@ def filled(recipe: QuestionPicture) -> float:
 
 def is_inside(recipe: QuestionPicture) -> bool:
     """True if no block or mark comes near the picture's edge."""
-    points = [drawn_m(block) for block in drawn_blocks(recipe)]
+    points = [pictures.drawn_m(block) for block in drawn_blocks(recipe)]
     points += [np.array([mark.position_m]) for mark in recipe.marks]
     return bool(np.abs(question_camera(recipe, _STYLE).project(np.vstack(points))).max() < _EDGE)
 
@@ -262,7 +250,7 @@ def block_mark(recipe: QuestionPicture, shot: Shot, order: int, letter: str) -> 
     across = ((int(columns[middle]) + 0.5) / SEEN_PX * 2 - 1) * HALF_TANGENT
     up = (1 - (int(rows[middle]) + 0.5) / SEEN_PX * 2) * HALF_TANGENT
     ray = camera.axes[0] * across + camera.axes[1] * up + camera.axes[2]
-    corners = drawn_m(block)[drawn_mesh(block.type).triangles]
+    corners = pictures.drawn_m(block)[drawn_mesh(block.type).triangles]
     one, two = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     crossed = np.cross(ray, two)
     scale = np.einsum("ij,ij->i", one, crossed)

@@ -15,7 +15,7 @@ from phyblock.config.validation import Count, Flag, PictureControls, TemplateNam
 from phyblock.domain.scene import AssemblyTask, Block
 from phyblock.files import bundled
 from phyblock.models.request import Image, Message, Request
-from phyblock.parsing.move import MoveProblem, ParsedMove, move_form, parse_move
+from phyblock.parsing.answer import MoveProblem, ParsedMove, move_form, parse_move
 from phyblock.parsing.text import AnswerForm
 from phyblock.records.record import AskedTurn, Course, Line, Record, Reply, SentPrompt, Whole
 from phyblock.scoring.plan import ERROR_TYPES

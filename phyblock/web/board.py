@@ -17,13 +17,7 @@ from phyblock.domain.scene import AssemblyTask
 from phyblock.errors import DataError
 from phyblock.records.files import ManifestModel, read_stopped
 from phyblock.results.compare import Side, comparable, rank_ranges_of
-from phyblock.results.estimates import (
-    Headline,
-    Value,
-    headline_rows,
-    track_estimates,
-    track_notes,
-)
+from phyblock.results.estimates import Headline, Value, headline_rows, track_estimates, track_notes
 from phyblock.results.load import Run, track_measures
 from phyblock.results.tables import coverage_frame
 from phyblock.results.text import number as rounded

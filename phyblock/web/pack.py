@@ -119,9 +119,7 @@ def _write_three(folder: Path) -> None:
         module,
     )
     module = re.sub(
-        rf"export{names};?\s*$",
-        lambda found: f"return{{...core,...{exported(found[1])}}}",
-        module,
+        rf"export{names};?\s*$", lambda found: f"return{{...core,...{exported(found[1])}}}", module
     )
     script = f"window.THREE=(core=>{{{module}}})((()=>{{{core}}})());\n"
     (folder / "three.js").write_text(script, encoding="utf-8")

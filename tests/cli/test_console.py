@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from rich.cells import cell_len
 
 from phyblock.cli.console import make_console, print_table
-from phyblock.cli.progress import ProgressView
+from phyblock.cli.run import ProgressView
 from phyblock.models.model import ModelEvent
 from phyblock.results.export import write_csv
 from phyblock.results.load import load_run
@@ -65,7 +65,7 @@ def test_tables_show_names_as_they_are():
     console.print(NAME.replace("\n", " "))
     view = ProgressView(console)
     view(RunStarted(1, {NAME: ()}))
-    console.print(view._progress.make_tasks_table(view._progress.tasks))
+    console.print(view.make_tasks_table(view.tasks))
     view(ModelEvent(NAME, "stopped", NAME))
     shown = console.file.getvalue()
     assert shown.count(SHOWN) == 7

@@ -13,7 +13,7 @@ import pytest
 from phyblock.errors import StoreError
 from phyblock.files import LIST
 from phyblock.results.tables import write_tables
-from phyblock.web.report import write_report
+from phyblock.web.pages import write_report
 from tests.servers.chassis import Faults
 from tests.servers.openai_chat import OpenAIChat
 from tests.web.factory import LEVELS, manifest, record, score, write_run

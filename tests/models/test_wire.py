@@ -29,8 +29,7 @@ from phyblock.models import client
 from phyblock.models.client import shown
 from phyblock.models.model import RetryPolicy
 from phyblock.models.request import Image, Message, json_body, wire_messages
-from phyblock.parsing.answer import choice_form
-from phyblock.parsing.move import move_form
+from phyblock.parsing.answer import choice_form, move_form
 from phyblock.parsing.plan import plan_form
 from phyblock.records.record import Reply
 from phyblock.run.plan import to_config

@@ -13,8 +13,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from phyblock.domain.scene import PoseStep
-from phyblock.parsing.answer import choice_form, parse_answer
-from phyblock.parsing.move import parse_move
+from phyblock.parsing.answer import choice_form, parse_answer, parse_move
 from phyblock.parsing.plan import MOST_POSE_STEPS, parse_plan, parse_poses, pose_form
 from tests.shipped import reply_texts
 from tests.workspace import csv_rows, plan_text

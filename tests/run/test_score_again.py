@@ -8,7 +8,7 @@ from collections import Counter
 import pytest
 
 from phyblock.errors import StoreError
-from phyblock.parsing.move import parse_move
+from phyblock.parsing.answer import parse_move
 from phyblock.parsing.plan import parse_plan
 from phyblock.records.files import read_manifest
 from phyblock.registry import known_tracks

@@ -11,8 +11,7 @@ from phyblock.domain.blocks import COLORS, KIT_PALETTE
 from phyblock.domain.question import LETTERS, Question
 from phyblock.domain.scene import Candidate, CandidateSet, Plan, Scene
 from phyblock.making.questions.guesses import text_rule
-from phyblock.parsing.answer import parse_answer
-from phyblock.parsing.move import parse_move
+from phyblock.parsing.answer import parse_answer, parse_move
 from phyblock.parsing.plan import parse_plan, parse_poses
 from phyblock.scoring.plan import Goal
 from phyblock.sim.pictures import joined_size_px

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from phyblock.domain.scene import AssemblyTask, Candidate, CandidateSet, Scene
 from phyblock.models.request import Image
-from phyblock.parsing.move import MOVE_PROBLEMS
+from phyblock.parsing.answer import MOVE_PROBLEMS
 from phyblock.records.record import Reply
 from phyblock.scoring.steps import MOVE_OUTCOMES
 from phyblock.tracks.pictures import Workshop

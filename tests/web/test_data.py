@@ -19,9 +19,8 @@ from phyblock.results.estimates import Headline
 from phyblock.results.load import load_run
 from phyblock.results.tables import write_tables
 from phyblock.web.board import SiteRun, Sources, board_of, entries_of
-from phyblock.web.leaderboard import check_runs, write_site
 from phyblock.web.pack import Pack, pack_samples
-from phyblock.web.report import write_report
+from phyblock.web.pages import check_runs, write_report, write_site
 from tests.web.factory import JSON, laws, manifest, record, record_lists, run_of, score, write_run
 from tests.workspace import files_below, problem_of
 

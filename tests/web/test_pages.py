@@ -8,7 +8,7 @@ import yaml
 
 from phyblock.results.tables import write_tables
 from phyblock.scoring.plan import ERROR_TYPES
-from phyblock.web.report import write_report
+from phyblock.web.pages import write_report
 from tests.web.conftest import HOSTILE, LOOK, NAME, expect
 from tests.web.factory import manifest, write_run
 
