@@ -17,9 +17,9 @@ from collections import defaultdict
 import numpy as np
 from scipy.special import ndtr, ndtri, stdtr, stdtrit  # type: ignore[import-untyped]
 
-from phyblock.scoring.plan import Floats, Metric, f1_of
+from phyblock.scoring.plan import Floats, Metric
 from phyblock.scoring.statistics import Clusters, in_range, jackknife
-from tests.scoring.cases import World
+from tests.scoring.cases import World, f1_of
 
 WORLDS = {
     "like the recorded models": World(),

@@ -68,12 +68,12 @@ def show_tables(folder: Path, data: Path | None = None, *, page: bool = True) ->
     from phyblock.results.tables import summary_of, write_tables
 
     written = write_tables(folder)
-    console, summary = ui.make_console(), summary_of(written.run)
-    for table in summary.tables:
+    console, (tables, blind, failures) = ui.make_console(), summary_of(written.run)
+    for table in tables:
         ui.print_table(console, table)
-    for model, message, times in summary.failures[:_FAILURES]:
+    for model, message, times in failures[:_FAILURES]:
         console.print(one_line(f"{times:,} x {model}: {message}"), style="yellow")
-    for sentence in summary.blind:
+    for sentence in blind:
         console.print(sentence)
     if page:
         from phyblock.web.pages import write_report

@@ -45,8 +45,8 @@ def export(
     file. lmms-eval: a folder for --include_path.
     """
     from phyblock.integrations import files
-    from phyblock.results.export import export_frame, write_csv
     from phyblock.results.load import load_run
+    from phyblock.results.tables import export_frame, write_csv
 
     named = (run is not None) + scenes + (questions is not None)
     if named != (form != "lmms-eval"):

@@ -16,14 +16,8 @@ from phyblock.config.suite import REPEAT
 from phyblock.config.yaml import shown
 from phyblock.errors import Problem, SpecError
 from phyblock.files import OutFolder
-from phyblock.results.estimates import (
-    Headline,
-    base_scenes,
-    cell_value,
-    counted_rows,
-    pooled_in,
-    track_notes,
-)
+from phyblock.results import estimates
+from phyblock.results.estimates import Headline
 from phyblock.results.load import Design, Run, checked_models, track_measures
 from phyblock.results.text import NO_VALUE, Column, TextTable, level_name, number, to_csv
 from phyblock.scoring import statistics
@@ -80,9 +74,8 @@ def check_pair(run: Run, first: Run, cells: Sequence[str], track: str, measure: 
 
 def _field(run: Run, path: str) -> Any:
     """Return the value at a path of keys in `run.yaml`, None if it is missing or false."""
-    name, *keys = path.split(".")
-    value: Any = getattr(run.manifest, name)
-    for key in keys:
+    value: Any = vars(run.manifest)
+    for key in path.split("."):
         value = value.get(key) if isinstance(value, Mapping) else None
     return value or None
 
@@ -128,10 +121,8 @@ class Samples:
 
     def values(self, measure: Measure) -> list[pd.Series]:
         """Return each side's values by scene, item, seed and variant, NaN where not defined."""
-        index, of_sides = (
-            pd.MultiIndex.from_frame(self.keys),
-            zip(self.counts, self.has, strict=True),
-        )
+        index = pd.MultiIndex.from_frame(self.keys)
+        of_sides = zip(self.counts, self.has, strict=True)
         return [pd.Series(measure.value(counts[has]), index[has]) for counts, has in of_sides]
 
 
@@ -157,8 +148,10 @@ class Comparable:
         wanted = dict(zip(SCORED_BY, (design.setting, design.matcher, part.criterion), strict=True))
         tables, counts = [], []
         for name, run in runs.items():
-            rows = counted_rows(run, self.track, self.measure.counted, self.cells.values(), design)
-            pooled = pooled_in(self.cells[part.cell], self.cells)
+            rows = estimates.counted_rows(
+                run, self.track, self.measure.counted, self.cells.values(), design
+            )
+            pooled = estimates.pooled_in(self.cells[part.cell], self.cells)
             masks = np.stack([rows.cells[name] for name in pooled])
             used = masks.any(axis=0)
             for column, value in wanted.items():
@@ -202,7 +195,7 @@ class Comparable:
         measure, both = self.measure, samples.has[list(pair)].all(axis=0)
         scene, scenes = pd.factorize(samples.keys["scene"].to_numpy()[both], sort=True)
         cell, counts = self.cells[part.cell], samples.counts[list(pair)][:, both]
-        pooled = pooled_in(cell, self.cells)
+        pooled = estimates.pooled_in(cell, self.cells)
         sums = np.zeros((len(scenes), 2, len(pooled), counts.shape[-1]))
         for side in range(2):
             np.add.at(sums[:, side], (scene, samples.cell[both]), counts[side])
@@ -212,7 +205,7 @@ class Comparable:
             single = measure.value(of)
             known = {name: single[..., n] for n, name in enumerate(pooled) if asked[n]}
             lacking = np.full(single.shape[:-1], np.nan)
-            return cell_value(cell, self.cells, known) if known else lacking
+            return estimates.cell_value(cell, self.cells, known) if known else lacking
 
         clusters, scale = statistics.Clusters.of([parents[name] for name in scenes]), measure.scale
         estimate = statistics.bounded(
@@ -248,7 +241,7 @@ def comparable(run: Run, track: str, measure: str = "") -> Comparable:
     names = [name for name, cell in cells.items() if cell.of or name not in joined]
     parts = tuple(Part(one or name, name, one) for name in names for one in reversed(criteria))
     is_shown = chosen.name in {column.measure for column in columns}
-    notes = track_notes(run, track) if is_shown else ()
+    notes = estimates.track_notes(run, track) if is_shown else ()
     how = " ".join((f"{chosen.heading}: {chosen.meaning}.", *notes, "Samples that both have."))
     return Comparable(track, chosen, cells, parts, how)
 
@@ -345,7 +338,7 @@ def compare_pairs(
     runs = list({id(side.run): side.run for side in sides}.values())
     for run in runs[1:]:
         check_pair(run, runs[0], [part.cell for part in parts], what.track, what.measure)
-    parents = {scene: found for run in runs for scene, found in base_scenes(run).items()}
+    parents = {scene: found for run in runs for scene, found in estimates.base_scenes(run).items()}
     rows = []
     for part in parts:
         samples = what.samples(sides, part, pairs[0][0].run.design)
@@ -500,7 +493,7 @@ def sensitivity_frame(run: Run) -> pd.DataFrame:
     the model answered under every condition. Repeats are no factor. Empty if nothing varies.
     """
     rows: list[tuple[object, ...]] = []
-    suite, parents = run.design.suite, base_scenes(run)
+    suite, parents = run.design.suite, estimates.base_scenes(run)
     factors = [factor for factor in suite.vary.factors if factor != REPEAT]
     ways = [(seed, one.key) for seed in suite.seeds for one in suite.vary.variants]
     # Variants are all combinations of levels, with the repeats of each in sequence.

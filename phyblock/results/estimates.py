@@ -20,20 +20,11 @@ from phyblock.results.load import Design, Run, track_measures
 from phyblock.scoring.plan import Floats
 from phyblock.scoring.statistics import Clusters, in_range, jackknife
 from phyblock.tracks.base import kind_of
-from phyblock.tracks.measures import (
-    CELL,
-    OVERALL,
-    SCORED_BY,
-    Better,
-    Cell,
-    LayoutColumn,
-    Measure,
-    SampleCounts,
-)
+from phyblock.tracks.measures import OVERALL, SCORED_BY, Cell, LayoutColumn, Measure, SampleCounts
 from phyblock.types import WITHOUT_REPLY
 
 ESTIMATE_COLUMNS = (
-    *("measure", "model", *SCORED_BY, CELL, "n", "value", "seeds", "mean", "sd", "least", "most"),
+    *("measure", "model", *SCORED_BY, "cell", "n", "value", "seeds", "mean", "sd", "least", "most"),
     *("lo", "hi", "se", "n_scenes", "n_clusters"),
 )
 _ABOUT = ["model", "scene", "item", "seed", "variant"]
@@ -276,7 +267,7 @@ class Floor(NamedTuple):
     name: str
     value: float
 
-    def is_below(self, value: Value, better: Better) -> bool:
+    def is_below(self, value: Value, better: str) -> bool:
         """True if the interval of a value lies wholly on the better side."""
         return value.lo > self.value if better == "higher" else value.hi < self.value
 
@@ -297,7 +288,7 @@ def shown_values(
     """
     scale = {measure.name: measure.scale for measure in track_measures(track)}
     rows = headline_rows(track_estimates(run, track), design or run.design)
-    fields = ("model", "measure", CELL, "criterion", "value", "lo", "hi")
+    fields = ("model", "measure", "cell", "criterion", "value", "lo", "hi")
     found = {}
     for row in zip(*(rows[name].tolist() for name in fields), strict=True):
         model, measure, cell, criterion, *numbers = row

@@ -11,14 +11,8 @@ import numpy as np
 
 from phyblock.config.suite import Suite
 from phyblock.errors import Problem, SpecError
-from phyblock.records.files import (
-    MANIFEST,
-    Manifest,
-    ManifestModel,
-    read_manifest,
-    run_records,
-    suite_of,
-)
+from phyblock.records import files
+from phyblock.records.files import Manifest, ManifestModel
 from phyblock.records.record import Record
 from phyblock.registry import added_measures
 from phyblock.tracks.base import kind_of
@@ -175,9 +169,9 @@ class Design:
         return frozenset(WITHOUT_REPLY) if self.suite.scoring.missing == "skip" else frozenset()
 
 
-def design_of(manifest: Manifest, where: str = MANIFEST) -> Design:
+def design_of(manifest: Manifest, where: str = files.MANIFEST) -> Design:
     """Return the design of a run. Raises StoreError naming `where` and every wrong field."""
-    return Design(suite_of(manifest, where), manifest.models, manifest.items, manifest.scenes)
+    return Design(files.suite_of(manifest, where), manifest.models, manifest.items, manifest.scenes)
 
 
 _SHOWN_AS = ("circular", "blind")
@@ -285,9 +279,9 @@ def load_run(path: str | Path) -> Run:
     `records.jsonl` that is corrupt, other than an unfinished last one, or belongs to another run.
     """
     folder = Path(path)
-    manifest = read_manifest(folder)
-    design = design_of(manifest, str(folder / MANIFEST))
-    lines = run_records(folder, manifest)
+    manifest = files.read_manifest(folder)
+    design = design_of(manifest, str(folder / files.MANIFEST))
+    lines = files.run_records(folder, manifest)
     frames = frames_of(((record, lines.start_bytes) for _, record in lines), design)
     return Run(folder, manifest, design, *frames, lines.is_cut)
 

@@ -1,11 +1,16 @@
-"""Tables of a run: layouts filled from its estimates, coverage, cost, and all of their files."""
+"""Tables of a run: layouts filled from its estimates, beside the paper's numbers, coverage, cost.
+
+Also the samples as rows for other tools, and the files of all.
+"""
 
 from __future__ import annotations
 
+import json
 import math
 from collections import Counter
 from collections.abc import Hashable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from importlib.resources import files
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -13,24 +18,16 @@ from typing import Any
 import pandas as pd
 
 from phyblock.files import OutFolder
+from phyblock.records.files import RecordLines, read_prompts, record_types
+from phyblock.records.record import PictureMark, PromptMessage, Record
 from phyblock.registry import added_measures
 from phyblock.results.compare import rank_ranges_of, rank_text, sensitivity_table, sides_of
-from phyblock.results.estimates import Headline, Value, shown_values, track_notes
+from phyblock.results.estimates import Headline, Value, shown_values, track_estimates, track_notes
 from phyblock.results.load import TOKENS, Run, load_run, track_measures
-from phyblock.results.paper import beside_paper
-from phyblock.results.text import (
-    NO_VALUE,
-    TABLES,
-    Column,
-    Summary,
-    TextTable,
-    captioned,
-    number,
-    to_csv,
-)
+from phyblock.results.text import NO_VALUE, TABLES, Column, TextTable, captioned, number, to_csv
 from phyblock.text import counted
 from phyblock.tracks.base import kind_of, kinds
-from phyblock.tracks.measures import Cell, Layout, LayoutColumn, Measure
+from phyblock.tracks.measures import OVERALL, Cell, Layout, LayoutColumn, Measure
 from phyblock.types import OUTCOMES
 
 _FURTHER = ("published", "sensitivity", "coverage", "cost")
@@ -135,7 +132,7 @@ def _sample_notes(run: Run, track: str) -> Iterator[str]:
     listed = ", ".join(
         f"{row['model']} {' and '.join(said)}"
         for row in table.to_dict("records")
-        if (said := [f"{row[name]} {text}" for name, text in lacking.items() if row[name]])
+        if (said := [f"{row[name]} {noun}" for name, noun in lacking.items() if row[name]])
     )
     if listed:
         how = "left out" if design.outcomes_left_out else "counted as wrong"
@@ -308,8 +305,12 @@ def make_tables(run: Run, names: Sequence[str] | None = None) -> dict[str, TextT
     return {name: table for name, table in made.items() if table is not None}
 
 
-def summary_of(run: Run) -> Summary:
-    """Return the summary of a run for the terminal."""
+def summary_of(run: Run) -> tuple[list[TextTable], list[str], list[tuple[str, str, int]]]:
+    """Return the text that the terminal shows at the end of a run.
+
+    Headline tables, and the coverage if it is not complete; one sentence per track on the strongest
+    blind baseline; failed calls by model and message, most frequent first.
+    """
     coverage, tracks = coverage_frame(run), run.design.suite.tracks
     tables = [headline_table(run, track, coverage) for track in tracks]
     if (coverage["ok"] < coverage["recorded"]).any():
@@ -317,8 +318,8 @@ def summary_of(run: Run) -> Summary:
     blind = [sentence for track in tracks if (sentence := blind_sentence(run, track))]
     failed = run.records.dropna(subset=["error_message"])
     messages = Counter(zip(failed["model"], failed["error_message"], strict=True))
-    failures = ((model, message, n) for (model, message), n in messages.most_common())
-    return Summary(tuple(tables), tuple(blind), tuple(failures))
+    failures = [(model, message, n) for (model, message), n in messages.most_common()]
+    return tables, blind, failures
 
 
 def headline_table(run: Run, track: str, coverage: pd.DataFrame) -> TextTable:
@@ -360,8 +361,155 @@ def blind_sentence(run: Run, track: str) -> str:
     models = [v for name, v in headline.ranked.items() if name not in run.design.baselines]
     above = sum(floor.is_below(value, better) for value in models)
     verb = "is" if len(models) == 1 else "are"
-    text = f"{above} of {counted(len(models), 'model')} {verb} shown to be above {named}"
+    said = f"{above} of {counted(len(models), 'model')} {verb} shown to be above {named}"
     if not models:
-        text = f"The strongest baseline here that never sees the goal is {named}"
+        said = f"The strongest baseline here that never sees the goal is {named}"
     title = f"{kind_of(track).title}: " if len(run.design.suite.tracks) > 1 else ""
-    return f"{title}{text}."
+    return f"{title}{said}."
+
+
+_METRICS = {"precision": "Prec", "recall": "Rec", "f1": "F1"}
+_COLUMNS = ["model", "published_name", "cell", "metric", "published", "ours", "difference", "n"]
+
+
+def published_table(table: int) -> pd.DataFrame:
+    """Return a results table of the paper (1, 2, 3 or 5), with one printed value [%] per row.
+
+    `published/README.md` explains the columns and the sources of the numbers.
+    """
+    with (files("phyblock.results") / "published" / f"table{table}.csv").open("rb") as file:
+        return pd.read_csv(file, dtype={"level": "object"})
+
+
+def published_frame(run: Run) -> pd.DataFrame:
+    """Return one row for each value of Table 1 of a model of the run, with ours [%].
+
+    Columns are model, published_name, cell, metric, published, ours, difference (ours minus
+    published) and n, the samples behind ours. Ours is not rounded, and NaN if the run does not
+    measure it. It is in setting A, by the `paper` matcher if the run has it.
+    """
+    design, suite, estimates = run.design, run.design.suite, track_estimates(run, "full_planning")
+    matcher = "paper" if "paper" in suite.scoring.matchers else design.matcher
+    ours = estimates[(estimates["setting"] == "A") & estimates["matcher"].isin(["", matcher])]
+    # The paper's overall numbers pool the scenes of these levels.
+    if not {2, 3, 4} <= set(suite.levels):
+        ours = ours[ours["cell"] != OVERALL]
+    ours = ours[["model", "cell", "n", "measure", "value"]]
+    ours = ours.rename(columns={"measure": "metric", "value": "ours"})
+    renamed = {"model": "published_name", "value": "published", "level": "cell"}
+    printed = published_table(1).rename(columns=renamed)
+    known = [(model.name, model.published) for model in design.models if model.published]
+    names = pd.DataFrame(known, columns=["model", "published_name"], dtype="object")
+    found = names.merge(printed, on="published_name")
+    found = found.merge(ours, on=["model", "cell", "metric"], how="left")
+    found["ours"] = 100 * found["ours"].astype("float64")
+    found["difference"] = found["ours"] - found["published"]
+    found["n"] = found["n"].astype("float64").fillna(0).astype("int64")
+    return found[_COLUMNS]
+
+
+def beside_paper(run: Run) -> TextTable | None:
+    """Return numbers beside the paper's Table 1; None without its models or official scenes."""
+    suite = run.design.suite
+    if "full_planning" not in suite.tracks or suite.dataset.format != "official":
+        return None
+    frame = published_frame(run)
+    if frame.empty:
+        return None
+    rows: dict[tuple[str, str], dict[str, object]] = {}
+    for row in frame.to_dict("records"):
+        model, metric, name = row["model"], row["metric"], row["published_name"]
+        about = {"model": model if name == model else f"{model} ({name})"}
+        shown = rows.setdefault((model, metric), {**about, "metric": _METRICS[metric]})
+        shown |= {
+            f"{row['cell']} {part}": row[part] for part in ("published", "ours", "difference")
+        }
+    headings = {cell.name: cell.heading for cell in run.cells("full_planning")}
+    columns = [Column.text("model", "Model", once=True), Column.text("metric", "")]
+    for cell in dict.fromkeys(frame["cell"]):
+        group = headings.get(cell, cell)
+        columns += [
+            Column.value(f"{cell} published", "Paper", group),
+            Column.value(f"{cell} ours", "Ours", group, 2),
+            Column.value(f"{cell} difference", "Diff", group, 2, signed=True),
+        ]
+    compared = frame["difference"].dropna()
+    notes = ["Ours: setting A, micro averages. Published: micro averages of one run."]
+    if len(compared):
+        largest = number(compared.abs().max(), 3)
+        notes.insert(0, f"Largest absolute difference of {len(compared)} cells: {largest}.")
+    caption = f"Our numbers beside the paper's Table 1{run.design.of_suite} (%)"
+    made = TextTable.of(pd.DataFrame([*rows.values()]), caption, columns, notes)
+    return replace(made, frame=frame)
+
+
+_SAME = (
+    *("sample", "track", "model", "scene", "seed", "levels", "parents", "n_blocks", "outcome"),
+    *("finish", "rule", "cost_usd", "latency_s", "attempts", *TOKENS, "cached"),
+)
+"""Columns that frames of records also have, with types that know of missing values."""
+_TEXTS = ("prompt", "reply", "reasoning", "provider_model", "error", "asked")
+
+
+def export_frame(run: Run) -> pd.DataFrame:
+    """Return one row per sample: prompt, model, reply, parsed answer and counts.
+
+    Counts are `tp_<setting>`, `fp_<setting>`, `fn_<setting>` of the headline matcher, all levels by
+    the `aov` criterion (for episodes over placed blocks). Columns have the same types for any rows;
+    values that a track does not have are missing. `levels`, `parents` and `plan` are lists.
+    """
+    types = {**dict.fromkeys(_TEXTS, "string"), "plan": "object"}
+    for record in record_types():
+        types |= {column: kind for column, (kind, _) in record.exported.items()}
+    for setting in run.design.suite.settings:
+        types |= {f"{name}_{setting.lower()}": "Int64" for name in ("tp", "fp", "fn")}
+    frame = run.records[list(_SAME)]
+    lists = frame[["levels", "parents"]].map(list)
+    nullable = {"object": "string", "float64": "Float64"}
+    frame = frame.astype({n: nullable.get(str(kind), kind) for n, kind in frame.dtypes.items()})
+    frame[["levels", "parents"]] = lists
+    if run.design.suite.vary.factors:
+        frame.insert(5, "variant", run.records["variant"].astype("string"))
+    prompts = read_prompts(run.path)
+    rows = [_row(run, one, prompts) for one in RecordLines(run.path).at(run.records["start"])]
+    return frame.join(pd.DataFrame(rows, frame.index, list(types)).astype(types))
+
+
+def _row(
+    run: Run, record: Record, prompts: Mapping[str, Sequence[PromptMessage]]
+) -> dict[str, Any]:
+    """Return the values of a record that a frame of records does not have."""
+    reply, plan = record.reply, getattr(record.parse, "plan", None)
+    messages = None if record.prompt is None else prompts.get(record.prompt.messages)
+    parts = [part for message in messages or () for part in message.parts]
+    found: dict[str, Any] = {
+        # As it was sent, pictures by their labels; None if none was stored.
+        "prompt": None if messages is None else "\n".join(
+            f"[picture: {part.image}]" if isinstance(part, PictureMark) else part for part in parts
+        ),
+        "reply": reply and reply.text,
+        "reasoning": reply and reply.reasoning,
+        "provider_model": reply and reply.provider_model,
+        "error": record.error and record.error.message,
+        "asked": record.asked,
+        "plan": None if plan is None else list(plan),
+        **record.export_row(),
+    }  # fmt: skip
+    for score in record.scores:
+        is_headline = score.matcher in (None, "", run.design.matcher)
+        if is_headline and score.criterion in ("aov", "placed"):
+            counts = {"tp": score.tp, "fp": score.fp, "fn": score.fn}
+            found |= {f"{name}_{score.setting.lower()}": n for name, n in counts.items()}
+    return found
+
+
+def write_csv(run: Run, folder: Path) -> tuple[Path, ...]:
+    """Write the rows of a run as `records.csv`, lists as JSON; return its path.
+
+    Raises StoreError if it cannot be written, or would replace a file that is not phyblock's.
+    """
+    frame = export_frame(run)
+    for name in ("levels", "parents", "plan"):
+        as_json = [json.dumps(v) if isinstance(v, list) else v for v in frame[name]]
+        frame[name] = pd.Series(as_json, dtype="object")
+    return OutFolder(folder).write({"records.csv": to_csv(frame)})

@@ -1,4 +1,4 @@
-"""Tables as text, CSV, Markdown and LaTeX; the summary of a run for the terminal."""
+"""Tables as text, CSV, Markdown and LaTeX."""
 
 from __future__ import annotations
 
@@ -225,16 +225,3 @@ def to_latex(table: TextTable, label: str) -> str:
 TABLES = "tables"
 """The folder of tables in the folder of a run."""
 REPORT_FILE = "report.html"
-
-
-@dataclass(frozen=True)
-class Summary:
-    """The text that the terminal shows at the end of a run.
-
-    Headline tables, the coverage if it is not complete, one sentence per track on the strongest
-    blind baseline, and failed calls by model and message, most frequent first.
-    """
-
-    tables: tuple[TextTable, ...] = ()
-    blind: tuple[str, ...] = ()
-    failures: tuple[tuple[str, str, int], ...] = ()

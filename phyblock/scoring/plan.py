@@ -13,14 +13,14 @@ from collections import Counter
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from heapq import heappop, heappush
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from phyblock.domain.question import Subtask
 from phyblock.domain.scene import CandidateSet, Plan, Scene
-from phyblock.types import Criterion, Level1Criterion, Matcher, Setting
+from phyblock.types import Level1Criterion, Matcher, Setting
 
 Floats = NDArray[np.float64]
 Metric = Callable[[Floats], Floats]
@@ -46,12 +46,6 @@ class Counts:
         """2 TP / (2 TP + FP + FN), or None if nothing was counted."""
         whole = 2 * self.tp + self.fp + self.fn
         return 2 * self.tp / whole if whole else None
-
-
-def f1_of(sums: Floats) -> Floats:
-    """2 TP / (2 TP + FP + FN) of counts (..., [tp, fp, fn])."""
-    twice = 2 * sums[..., 0]
-    return ratio_of(np.stack([twice, twice + sums[..., 1] + sums[..., 2]], axis=-1))
 
 
 def ratio_of(sums: Floats) -> Floats:
@@ -415,26 +409,9 @@ def steps_kept(goal: Goal, plan: Plan, at_least: int = 0) -> int:
                 heappush(open_ways, (-bound(at + 1, now, closed_now), -at - 1, now, closed_now))
 
 
-@dataclass(frozen=True, kw_only=True)
-class Score(Counts):
-    """Counts of one plan under one criterion and setting, with the field names of records.
-
-    `matcher`, `errors` (wrong steps by type), `placed` (the goal vertex of each step), `why` (the
-    error of each), `blocks` (goal blocks by outcome) and `kept` (steps that the nearest valid order
-    keeps) belong to criterion `aov` and are None for the Level-1 criteria.
-    """
-
-    criterion: Criterion
-    setting: Setting
-    matcher: Matcher | None = None
-    errors: dict[ErrorType, int] | None = None
-    placed: tuple[int | None, ...] | None = None
-    why: tuple[ErrorType | None, ...] | None = None
-    blocks: dict[BlockOutcome, int] | None = None
-    kept: int | None = None
-
-
 _PLANS_KEPT = 16
+_ONLY_AOV = dict.fromkeys(("matcher", "errors", "placed", "why", "blocks", "kept"))
+"""Fields of scores that Level-1 criteria do not have."""
 
 
 class AssemblyScorer:
@@ -448,22 +425,24 @@ class AssemblyScorer:
 
     def _score(
         self, plan: Plan, matchers: tuple[Matcher, ...], level1: Level1Criterion | None
-    ) -> tuple[Score, ...]:
-        """Return scores by setting, then matcher. Raises KeyError for an unknown candidate."""
-        scores: list[Score] = []
+    ) -> tuple[dict[str, Any], ...]:
+        """Return the fields of a record's scores, by setting, then matcher.
+
+        Raises KeyError for an unknown candidate.
+        """
+        scores: list[dict[str, Any]] = []
         for setting, goal in self._goals.items():
             matches = [match_plan(goal, plan, matcher) for matcher in matchers]
             placed = [match.counts.tp for match in matches]
             kept = steps_kept(goal, plan, max(placed))
             outcomes = block_outcomes(goal, plan, placed)
             for matcher, match, blocks in zip(matchers, matches, outcomes, strict=True):
+                way = {"criterion": "aov", "setting": setting, "matcher": matcher}
                 errors = {name: match.errors.count(name) for name in ERROR_TYPES}
-                scores.append(
-                    Score(**vars(match.counts), criterion="aov", setting=setting, matcher=matcher,
-                          errors=errors, placed=match.vertices,
-                          why=match.errors, blocks=blocks, kept=kept)
-                )  # fmt: skip
+                steps = {"errors": errors, "placed": match.vertices, "why": match.errors}
+                found = {**vars(match.counts), **steps, "blocks": blocks, "kept": kept}
+                scores.append({**way, **found})
             if level1 is not None and 1 in self._scene.levels:
                 counts = vars(level1_counts(goal, plan, level1))
-                scores.append(Score(**counts, criterion=level1, setting=setting))
+                scores.append({"criterion": level1, "setting": setting, **counts, **_ONLY_AOV})
         return tuple(scores)

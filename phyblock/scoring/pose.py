@@ -14,6 +14,7 @@ volumes of intersections of convex pieces.
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 from collections.abc import Sequence
@@ -89,7 +90,7 @@ class Nearness:
     turn_deg: Floats
     equal: NDArray[np.bool_]
 
-    @property
+    @functools.cached_property
     def within(self) -> NDArray[np.int64]:
         """The number of tolerances each pair is within."""
         limits = np.array(TOLERANCES_CM) + _SLACK
@@ -342,7 +343,6 @@ class PoseScore:
     frame: PoseFrame
     fits: tuple[PoseFit | None, ...]
     right: tuple[int, ...]
-    n_blocks: int
     motion: Motion
 
 
@@ -360,7 +360,7 @@ class PoseScorer:
         given = [(n, block) for n, block in zip(numbers, blocks, strict=True) if block is not None]
         if not given:
             fits, none = (None,) * len(numbers), (0,) * len(TOLERANCES_CM)
-            return tuple(PoseScore(f, fits, none, len(self._blocks), Motion()) for f in POSE_FRAMES)
+            return tuple(PoseScore(frame, fits, none, Motion()) for frame in POSE_FRAMES)
         kept, steps = zip(*given, strict=True)
         turns = np.array([euler_deg_to_matrix(block.euler_deg) for block in self._blocks])
         equal = np.zeros((len(steps), len(self._blocks)), dtype=bool)
@@ -422,7 +422,7 @@ class PoseScorer:
         n = len(TOLERANCES_CM)
         # The widest tolerance comes last; a step within one is within all wider ones.
         right = tuple(sum(count >= n - place for count in within) for place in range(n))
-        return PoseScore(frame, tuple(fits), right, len(self._blocks), motion)
+        return PoseScore(frame, tuple(fits), right, motion)
 
 
 PoseError = Literal[
@@ -493,25 +493,14 @@ def blocks_reached(
     """Return how many goal blocks can each be matched to a near enough block of its kind."""
     if not goal or not blocks:
         return 0
-    wanted, found = (
-        [
-            (block, center, euler_deg_to_matrix(block.euler_deg))
-            for block, center in zip(some, centers_m(some), strict=True)
-        ]
-        for some in (goal, blocks)
-    )
-    near = np.array(
-        [
-            [
-                one.kind == other.kind
-                and math.dist(place, there) * _CM <= within_cm
-                and turn_deg(one.type, turn, turned) <= within_deg
-                for other, there, turned in found
-            ]
-            for one, place, turn in wanted
-        ]
-    )
-    return sum(bool(near[pair]) for pair in cheapest((~near).astype(np.float64)))
+    far = np.ones((len(goal), len(blocks)))
+    centers = [*zip(blocks, centers_m(blocks), strict=True)]
+    for row, (one, place) in enumerate(zip(goal, centers_m(goal), strict=True)):
+        for column, (other, there) in enumerate(centers):
+            if one.kind == other.kind and math.dist(place, there) * _CM <= within_cm:
+                turns = (euler_deg_to_matrix(block.euler_deg) for block in (one, other))
+                far[row, column] = turn_deg(one.type, *turns) > within_deg
+    return sum(not far[pair] for pair in cheapest(far))
 
 
 _AXES = np.eye(3)

@@ -1,4 +1,4 @@
-"""Uncertainty: a cluster jackknife over base scenes, tests of differences, ranks, components.
+"""Uncertainty: a cluster jackknife over base scenes, tests of differences, ranks, shifts.
 
 Scenes made from the same base scene succeed and fail together, and a scene that combines two base
 scenes shares something with every scene made from either of them. The variance of a statistic then
@@ -11,18 +11,13 @@ statistic and is less optimistic with few clusters (MacKinnon, Nielsen and Webb,
 reliable jackknife and bootstrap methods for cluster-robust inference*, Journal of Applied
 Econometrics 38, 2023). docs/statistics.md has the simulation.
 
-Variance components describe how much a varied factor (seed, prompt, background) moves scores. Items
-are crossed with the levels of the factor, and both with *blocks*: the combinations of everything
-else that was varied. The *shift* is the effect of a level on all items in common: the standard
-deviation of the levels' means. The *interaction* is its effect on single items beyond that: the
-standard deviation of an item's scores over levels, without the shift and the differences between
-blocks. Both are method-of-moments estimates of a crossed design with items as a random facet
-(Cornfield and Tukey, *Average values of mean squares in factorials*, Annals of Mathematical
-Statistics 27, 1956; Brennan, *Generalizability Theory*, 2001). Items of common origin are not an
-independent sample, so the error of the levels' means comes from the jackknife.
-
-Item analysis is that of classical test theory (Lord and Novick, *Statistical Theories of Mental
-Test Scores*, 1968).
+The *shift* by a varied factor (prompt, background) is the effect of its levels on all items in
+common: the standard deviation of the levels' means. Items are crossed with the levels, and both
+with *blocks*: the combinations of everything else that was varied. It is a method-of-moments
+estimate with items as a random facet (Cornfield and Tukey, *Average values of mean squares in
+factorials*, Annals of Mathematical Statistics 27, 1956; Brennan, *Generalizability Theory*, 2001).
+Items of common origin are not an independent sample, so the error of the levels' means comes from
+the jackknife.
 """
 
 from __future__ import annotations

@@ -78,7 +78,7 @@ class Assembly:
     @property
     def vertices(self) -> tuple[int, ...]:
         """The goal vertices that are placed in the world as shown, in file order."""
-        return tuple(v for v in range(len(self.scene)) if self.placed >> v & 1)
+        return tuple(_bits(self.placed))
 
     def right_moves(self) -> tuple[int, ...]:
         """The candidate numbers that would be placed now."""
@@ -153,11 +153,6 @@ def placed_counts(
     have = Counter(getattr(candidates[index], attribute) for index in standing)
     tp = sum((wanted & have).values())
     return Counts(tp, len(chosen) - tp, len(scene) - tp)
-
-
-def attempted_counts(placed: Counts, attempts: int) -> Counts:
-    """Counts over every attempted move, where moves that placed nothing are false positives too."""
-    return Counts(placed.tp, attempts - placed.tp, placed.fn)
 
 
 def _bits(mask: int) -> Iterator[int]:

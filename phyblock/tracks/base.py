@@ -140,13 +140,13 @@ class Picking:
     """
 
     choices: tuple[Choice, ...]
-    least: int
-    most: int
-    repeats: bool
-    noun: str
     write: Callable[[Sequence[Pick]], str]
-    fields: tuple[NumberField, ...] = ()
     task: str = ""
+    noun: str = "step"
+    least: int = 1
+    most: int = 1
+    repeats: bool = False
+    fields: tuple[NumberField, ...] = ()
 
     def without_cells(self) -> Picking:
         """Return the same with choices that are whole pictures."""
@@ -470,14 +470,8 @@ def log_orders(graph: AOVGraph) -> float:
     The bound is n! divided, for each block, by the number of blocks that need it (or that it
     needs), itself included: exact if no block rests on two others, or no two rest on one.
     """
-    needed = [0] * len(graph)
-    for vertex in sorted(range(len(graph)), key=graph.layers.__getitem__):
-        needed[vertex] = 1 << vertex
-        for other in graph.depends_on[vertex]:
-            needed[vertex] |= needed[other]
-    below = [mask.bit_count() for mask in needed]
-    above = [sum(mask >> vertex & 1 for mask in needed) for vertex in range(len(graph))]
-    most = max(-math.log10(math.prod(sizes)) for sizes in (below, above))
+    sizes = ([mask.bit_count() for mask in masks] for masks in (graph.below, graph.above))
+    most = max(-math.log10(math.prod(of_blocks)) for of_blocks in sizes)
     return math.log10(math.factorial(len(graph))) + most
 
 

@@ -27,14 +27,7 @@ from phyblock.files import bundled
 from phyblock.parsing.plan import ParsedPlan, parse_plan, plan_form
 from phyblock.parsing.text import AnswerForm
 from phyblock.records.record import Line, Record, Score
-from phyblock.scoring.plan import (
-    BLOCK_OUTCOMES,
-    ERROR_TYPES,
-    AssemblyScorer,
-    Counts,
-    Goal,
-    most_placed,
-)
+from phyblock.scoring.plan import BLOCK_OUTCOMES, ERROR_TYPES, AssemblyScorer, Goal, most_placed
 from phyblock.sim.pictures import PictureStyle, goal_camera, segments
 from phyblock.tracks.base import Judgement, Picking, SceneTrack, candidate_choices, presented
 from phyblock.tracks.measures import SampleCounts, level_cells
@@ -376,7 +369,8 @@ POSE_COUNTS = SampleCounts(
 def _steps(score: Score) -> tuple[float, ...]:
     """Count steps; under `membership`, repeated ones count again, so single plans have no value."""
     alone = score.criterion != "membership"
-    f1 = Counts(score.tp, score.fp, score.fn).f1 or 0.0
+    named = 2 * score.tp + score.fp + score.fn
+    f1 = 2 * score.tp / named if named else 0.0
     whole = alone and score.fp == score.fn == 0
     return score.tp, score.fp, score.fn, whole, alone * f1, alone
 
@@ -435,12 +429,10 @@ class FullPlanning(SceneTrack):
         """Return the choices of a person: any candidates, each as often as needed."""
         return Picking(
             candidate_choices(len(subject.candidates)),
-            least=1,
+            lambda picks: plan_text(pick.place + 1 for pick in picks),
+            "Pick the blocks that build the goal, each once all it rests on is there.",
             most=99,  # Far more than any goal has.
             repeats=True,
-            noun="step",
-            write=lambda picks: plan_text(pick.place + 1 for pick in picks),
-            task="Pick the blocks that build the goal, each once all it rests on is there.",
         )
 
     def open(self) -> None:
@@ -479,7 +471,7 @@ class FullPlanning(SceneTrack):
             "plan": parsed.plan.steps,
             **{n: getattr(parsed, n) for n in ("rule", "dropped", "problem", "truncated")},
         }
-        fields = {"parse": parse, "scores": list(map(vars, scores))}
+        fields = {"parse": parse, "scores": list(scores)}
         return Judgement(parsed.rule is not None, fields)
 
 

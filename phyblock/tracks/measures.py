@@ -27,8 +27,6 @@ Way = tuple[str, str, str]
 """Setting, matcher and criterion of a score; "" where there is no choice."""
 SCORED_BY = ("setting", "matcher", "criterion")
 """Columns of the parts of a `Way`."""
-CELL = "cell"
-"""Column of the cell in which samples are summed."""
 OVERALL = "overall"
 """The name of the cell of all samples."""
 Better = Literal["higher", "lower"]

@@ -14,30 +14,13 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Self, TypeVar
 
+from phyblock import files
 from phyblock.config.suite import ImagesSpec
 from phyblock.domain.scene import AssemblyTask
 from phyblock.errors import DataError, Problem, SimulationError
-from phyblock.files import (
-    LARGEST_PICTURE_BYTES,
-    atomic_write,
-    cache_dir,
-    open_picture,
-    read_bytes,
-    read_picture,
-    writing,
-)
 from phyblock.models.request import Image
-from phyblock.sim.pictures import (
-    PictureStyle,
-    candidates_key,
-    candidates_png,
-    composite_png,
-    goal_key,
-    goal_png,
-    goal_style,
-    joined_size_px,
-    to_png,
-)
+from phyblock.sim import pictures
+from phyblock.sim.pictures import PictureStyle
 from phyblock.text import hex_digest
 from phyblock.types import BACKGROUNDS, View
 
@@ -80,7 +63,7 @@ class Workshop:
     def __init__(self, workers: int = 0, folder: Path | None = None) -> None:
         """Without `workers`, as many as there are processors, at most four."""
         self.rendered = 0
-        self._folder = folder or cache_dir() / "pictures"
+        self._folder = folder or files.cache_dir() / "pictures"
         self._workers = workers or min(_WORKERS, os.cpu_count() or 1)
         self._pool: Executor | None = None
         self._alone = asyncio.Lock()
@@ -148,13 +131,13 @@ class Workshop:
         elif image is None:
             # A damaged file is drawn again.
             with contextlib.suppress(OSError, ValueError, DataError):
-                data = read_bytes(self._path(drawing.key), LARGEST_PICTURE_BYTES)
+                data = files.read_bytes(self._path(drawing.key), files.LARGEST_PICTURE_BYTES)
                 if data.startswith(_PNG_START) and data.endswith(_PNG_END):
                     image = self._remembered(drawing, data)
         return image
 
     def _remembered(self, drawing: Drawing, data: bytes) -> Image:
-        with open_picture(data, f"picture {drawing.label}") as opened:
+        with files.open_picture(data, f"picture {drawing.label}") as opened:
             image = Image(data, drawing.label, *opened.size)
         with self._recent_lock:
             self._recent[drawing.key, drawing.label] = image
@@ -165,9 +148,9 @@ class Workshop:
     def _keep(self, drawing: Drawing, data: bytes) -> Image:
         self.rendered += 1
         path = self._path(drawing.key)
-        with writing(path, "name another cache folder with PHYBLOCK_CACHE"):
+        with files.writing(path, "name another cache folder with PHYBLOCK_CACHE"):
             path.parent.mkdir(parents=True, exist_ok=True)
-            atomic_write(path, data)
+            files.atomic_write(path, data)
         return self._remembered(drawing, data)
 
     def _path(self, key: str) -> Path:
@@ -203,16 +186,18 @@ def scene_drawings(task: AssemblyTask, images: ImagesSpec) -> tuple[Drawing, ...
     """
     if images.source == "render":
         style = picture_style(images)
-        style = style if task.is_blind else goal_style(task.scene, style)
-        goal = Drawing.of("goal", goal_key, goal_png, task.scene, style)
-        grid = Drawing.of("candidates", candidates_key, candidates_png, task.candidates, style)
+        style = style if task.is_blind else pictures.goal_style(task.scene, style)
+        goal = Drawing.of("goal", pictures.goal_key, pictures.goal_png, task.scene, style)
+        grid = Drawing.of(
+            "candidates", pictures.candidates_key, pictures.candidates_png, task.candidates, style
+        )
         key, join = hex_digest(f"composite {goal.key} {grid.key}"), partial(_joined, goal, grid)
-        both = Drawing("composite", key, join, joined_size_px(style.size_px))
+        both = Drawing("composite", key, join, pictures.joined_size_px(style.size_px))
         made = {one.label: one for one in (goal, grid, both)}
     elif (path := task.composite) is not None:
         makes = {"goal": partial(_half, path, is_goal=True), "candidates": partial(_half, path)}
-        makes["composite"] = partial(read_picture, path)
-        key = hex_digest(read_picture(path))
+        makes["composite"] = partial(files.read_picture, path)
+        key = hex_digest(files.read_picture(path))
         made = {label: Drawing(label, key, make, is_file=True) for label, make in makes.items()}
     else:
         message, hint = "the data set has no picture of it", "use images.source: render"
@@ -224,15 +209,15 @@ def scene_drawings(task: AssemblyTask, images: ImagesSpec) -> tuple[Drawing, ...
 
 
 def _joined(goal: Drawing, grid: Drawing) -> bytes:
-    return composite_png(goal.make(), grid.make())
+    return pictures.composite_png(goal.make(), grid.make())
 
 
 def _half(composite: Path, *, is_goal: bool = False) -> bytes:
     """Return goal or candidates cut out of a 2:1 composite: two squares, with a gap between."""
-    with open_picture(read_picture(composite), str(composite)) as picture:
+    with files.open_picture(files.read_picture(composite), str(composite)) as picture:
         # PNG has no CMYK, which JPEG files may use.
         picture = picture.convert("RGB") if picture.mode == "CMYK" else picture
         width, height = picture.size
         side = width // 2 - width // 256
         left = 0 if is_goal else width - side
-        return to_png(picture.crop((left, 0, left + side, height)))
+        return pictures.to_png(picture.crop((left, 0, left + side, height)))

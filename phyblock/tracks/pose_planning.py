@@ -15,25 +15,13 @@ import numpy as np
 from phyblock.config.validation import PictureControls, TemplateName
 from phyblock.domain.scene import AssemblyTask, Block, Plan, PoseStep, Scene
 from phyblock.files import bundled
-from phyblock.parsing.plan import (
-    FARTHEST_PLACE_CM,
-    MOST_POSE_STEPS,
-    ParsedPoses,
-    parse_poses,
-    pose_form,
-)
+from phyblock.parsing import plan
+from phyblock.parsing.plan import ParsedPoses
 from phyblock.parsing.text import AnswerForm
 from phyblock.records.record import Amount, Course, Line, Record, Whole
+from phyblock.scoring import pose
 from phyblock.scoring.plan import AssemblyScorer
-from phyblock.scoring.pose import (
-    POSE_ERRORS,
-    POSE_FRAMES,
-    TOLERANCES_CM,
-    PoseError,
-    PoseScorer,
-    blocks_reached,
-    pose_errors,
-)
+from phyblock.scoring.pose import PoseError, PoseScorer
 from phyblock.sim.balance import is_balanced, surely_stands
 from phyblock.sim.contact import voxel_iou
 from phyblock.sim.dynamics import ExecutionLimits, execute, execution_physics, groups
@@ -41,16 +29,8 @@ from phyblock.sim.engine import Pose, described_engine
 from phyblock.sim.geometry import box_height_cm, center_cm, origin_m, put
 from phyblock.sim.pictures import goal_style, kit_key, kit_png, ruled_key, ruled_png, written_style
 from phyblock.text import plain_sum
-from phyblock.tracks.base import (
-    ENGINE,
-    EXECUTION,
-    Judgement,
-    NumberField,
-    Pick,
-    Picking,
-    SceneTrack,
-    candidate_choices,
-)
+from phyblock.tracks import base
+from phyblock.tracks.base import Judgement, NumberField, Pick, Picking, SceneTrack
 from phyblock.tracks.full_planning import PlanParse, PlanSubject, needed_candidate
 from phyblock.tracks.measures import SampleCounts, level_cells
 from phyblock.tracks.pictures import Drawing, picture_style
@@ -206,29 +186,28 @@ def judge_poses(
 
     If an `earlier` record holds the same plan and tolerances, its result is used.
     """
-    n, scorer = len(item.candidates), _scorer(item.scene, item.candidates)
-    parsed = ParsedPoses((), None) if text is None else parse_poses(text, n)
+    n, of_poses = len(item.candidates), _scorer(item.scene, item.candidates)
+    parsed = ParsedPoses((), None) if text is None else plan.parse_poses(text, n)
     given, numbers = parsed.steps, [step.candidate for step in parsed.steps]
     blocks = [put(step, item.candidates) for step in given]
-    poses = scorer.score(numbers, blocks)
+    poses = of_poses.score(numbers, blocks)
     fits = poses[0].fits
     steps = [{"block": step.candidate, "center_cm": step.center_cm} for step in given]
-    pose: Mapping[str, Any] = {}
+    done: Mapping[str, Any] = {}
     if isinstance(earlier, PoseRecord) and earlier.pose is not None and earlier.parse is not None:
         known = [step.fields() for step in earlier.parse.steps]
-        pose = earlier.pose.fields() if known == steps else {}
-    if pose.get("limits") != _LIMITS or len(pose["steps"]) != len(steps):
-        pose = _executed(item.scene, blocks)
-    errors = pose_errors(scorer.goal, numbers, fits, [step["end"] for step in pose["steps"]])
+        done = earlier.pose.fields() if known == steps else {}
+    if done.get("limits") != _LIMITS or len(done["steps"]) != len(steps):
+        done = _executed(item.scene, blocks)
+    errors = pose.pose_errors(of_poses.goal, numbers, fits, [step["end"] for step in done["steps"]])
     # The plan without its poses, under every setting and matcher.
-    plan = [number for number in numbers if 1 <= number <= n]
-    scores = AssemblyScorer(item.scene, item.candidates, settings).score(
-        Plan(tuple(plan)), matchers, None
-    )
+    named = [number for number in numbers if 1 <= number <= n]
+    of_plans = AssemblyScorer(item.scene, item.candidates, settings)
+    scores = of_plans.score(Plan(tuple(named)), matchers, None)
     parse = {
         "parser": "poses",
         "rule": parsed.rule,
-        "plan": plan,
+        "plan": named,
         "dropped": [number for number in numbers if not 1 <= number <= n],
         "problem": parsed.problem,
         "steps": steps,
@@ -240,20 +219,19 @@ def judge_poses(
             **{name: end[name] for name in (*_ENDED, "rests") if name in end},
             "error": error,
         }
-        for fit, end, error in zip(fits, pose["steps"], errors, strict=True)
+        for fit, end, error in zip(fits, done["steps"], errors, strict=True)
     ]
     right = {score.frame: list(score.right) for score in poses}
-    fields = {"parse": parse, "scores": list(map(vars, scores))}
-    return Judgement(
-        parsed.rule is not None, {**fields, "pose": {**pose, "right": right, "steps": scored}}
-    )
+    judged = {**done, "right": right, "steps": scored}
+    fields = {"parse": parse, "scores": list(scores), "pose": judged}
+    return Judgement(parsed.rule is not None, fields)
 
 
 def _executed(scene: Scene, blocks: Sequence[Block | None]) -> dict[str, Any]:
     """Return the fields of an executed plan; the engine executes one plan at a time."""
     with _ONE_AT_A_TIME:
         done = execute(blocks, physics=execution_physics(scene.blocks))
-    goal, reached = scene.blocks, blocks_reached(scene.blocks, done.blocks, *_REACHED.values())
+    goal, reached = scene.blocks, pose.blocks_reached(scene.blocks, done.blocks, *_REACHED.values())
     lies = {n: Pose.goal(block) for n, block in enumerate(blocks, 1) if block is not None}
     steps = []
     for step, world in zip(done.steps, done.worlds, strict=True):
@@ -357,25 +335,25 @@ def _random(subject: PlanSubject, rng: np.random.Generator) -> str:
 
 
 def _right(record: PoseRecord) -> tuple[float, ...] | None:
-    if (pose := record.pose) is None:
+    if (done := record.pose) is None:
         return None
-    right, score = (n for frame in POSE_FRAMES for n in pose.right[frame]), record.scores[0]
+    right, score = (n for frame in pose.POSE_FRAMES for n in done.right[frame]), record.scores[0]
     return (*right, score.tp + score.fp, score.tp + score.fn)
 
 
 def _fits(record: PoseRecord) -> tuple[float, ...] | None:
-    if (pose := record.pose) is None:
+    if (done := record.pose) is None:
         return None
-    fits = [step for step in pose.steps if step.vertex is not None]
+    fits = [step for step in done.steps if step.vertex is not None]
     return (*(plain_sum(getattr(fit, part) for fit in fits) for part in _FITS), len(fits))
 
 
 def _ends(record: PoseRecord) -> tuple[float, ...] | None:
-    if (pose := record.pose) is None:
+    if (done := record.pose) is None:
         return None
-    ends = Counter(name for step in pose.steps for name in (step.end, step.error))
-    whole = (pose.reached, record.n_blocks, pose.iou, pose.completed, 1)
-    return (*(ends[name] for name in (*STEP_ENDS, *POSE_ERRORS)), len(pose.steps), *whole)
+    ends = Counter(name for step in done.steps for name in (step.end, step.error))
+    whole = (done.reached, record.n_blocks, done.iou, done.completed, 1)
+    return (*(ends[name] for name in (*STEP_ENDS, *pose.POSE_ERRORS)), len(done.steps), *whole)
 
 
 def _plan(setting: Setting) -> SampleCounts:
@@ -388,10 +366,10 @@ def _plan(setting: Setting) -> SampleCounts:
     return SampleCounts(f"plan_{setting.lower()}", ("tp", "fp", "fn"), record=of)
 
 
-_SAME = tuple(f"tracks.pose_planning.{key}" for key in (EXECUTION, ENGINE))
+_SAME = tuple(f"tracks.pose_planning.{key}" for key in (base.EXECUTION, base.ENGINE))
 _FITS = ("position_cm", "turn_deg", "iou")
 _WHOLE_COUNTS = ("steps", "reached", "blocks", "iou", "completed", "plans")
-_RIGHT = tuple(f"{frame}_{cm:g}" for frame in POSE_FRAMES for cm in TOLERANCES_CM)
+_RIGHT = tuple(f"{frame}_{cm:g}" for frame in pose.POSE_FRAMES for cm in pose.TOLERANCES_CM)
 FITS = SampleCounts("fits", (*_FITS, "n"), record=_fits)
 
 
@@ -419,7 +397,7 @@ class PosePlanning(SceneTrack):
         SampleCounts("poses", (*_RIGHT, "steps", "blocks"), record=_right),
         FITS,
         SampleCounts(
-            "executed", (*STEP_ENDS, *POSE_ERRORS, *_WHOLE_COUNTS), record=_ends, same=_SAME
+            "executed", (*STEP_ENDS, *pose.POSE_ERRORS, *_WHOLE_COUNTS), record=_ends, same=_SAME
         ),
         _plan("A"),
         _plan("B"),
@@ -438,16 +416,14 @@ class PosePlanning(SceneTrack):
             placed = ((pick.place + 1, pick.numbers) for pick in picks)
             return written(PoseStep(number, (x, y, z)) for number, (x, y, z) in placed)
 
+        center = (NumberField(name, "cm", plan.FARTHEST_PLACE_CM, 2, 0.5, 5.0) for name in "xyz")
         return Picking(
-            candidate_choices(len(subject.candidates), (KIT_LABEL,)),
-            least=1,
-            most=MOST_POSE_STEPS,
+            base.candidate_choices(len(subject.candidates), (KIT_LABEL,)),
+            write,
+            "Pick the blocks that build the goal, in order, and say where the center of each is.",
+            most=plan.MOST_POSE_STEPS,
             repeats=True,
-            noun="step",
-            write=write,
-            fields=tuple(NumberField(name, "cm", FARTHEST_PLACE_CM, 2, 0.5, 5.0) for name in "xyz"),
-            task="Pick the blocks that build the goal, in order, and say where the center of each "
-            "is.",
+            fields=tuple(center),
         )
 
     def draw(self, item: AssemblyTask) -> tuple[Drawing, ...]:
@@ -462,11 +438,11 @@ class PosePlanning(SceneTrack):
 
     def identity(self) -> dict[str, Any]:
         """Return what determines its results, with the version of plan execution."""
-        return {**super().identity(), EXECUTION: EXECUTION_VERSION}
+        return {**super().identity(), base.EXECUTION: EXECUTION_VERSION}
 
     def json_form(self, item: AssemblyTask) -> AnswerForm[Any]:
         """Return the JSON form of a plan."""
-        return pose_form(len(item.candidates))
+        return plan.pose_form(len(item.candidates))
 
     def subject_of(self, item: AssemblyTask) -> PlanSubject:
         """Return the subject of baselines."""

@@ -346,12 +346,11 @@ class Vqa(Track):
         )
         return Picking(
             choices,
+            lambda picks: choice_text(pick.place for pick in picks),
+            subject.question.text,
+            noun="place" if is_ordering else "option",
             least=picked,
             most=picked,
-            repeats=False,
-            noun="place" if is_ordering else "option",
-            write=lambda picks: choice_text([pick.place for pick in picks]),
-            task=subject.question.text,
         )
 
     def open(self) -> None:

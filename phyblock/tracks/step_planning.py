@@ -18,26 +18,14 @@ from phyblock.models.request import Image, Message, Request
 from phyblock.parsing.answer import MoveProblem, ParsedMove, move_form, parse_move
 from phyblock.parsing.text import AnswerForm
 from phyblock.records.record import AskedTurn, Course, Line, Record, Reply, SentPrompt, Whole
-from phyblock.scoring.plan import ERROR_TYPES
-from phyblock.scoring.steps import (
-    MOVE_OUTCOMES,
-    Assembly,
-    MoveOutcome,
-    attempted_counts,
-    placed_counts,
-)
+from phyblock.scoring.plan import ERROR_TYPES, Counts
+from phyblock.scoring.steps import MOVE_OUTCOMES, Assembly, MoveOutcome, placed_counts
 from phyblock.sim.dynamics import DEFAULT_TRIAL, ONE_SETTING, settle
 from phyblock.sim.engine import described_engine
 from phyblock.sim.pictures import goal_style
 from phyblock.sim.question_pictures import question_key, question_png, state_picture
-from phyblock.tracks.base import (
-    ENGINE,
-    Choice,
-    Judgement,
-    Picking,
-    SceneTrack,
-    candidate_choices,
-)
+from phyblock.tracks import base
+from phyblock.tracks.base import Choice, Judgement, Picking, SceneTrack
 from phyblock.tracks.full_planning import POSE_COUNTS, PlanParse, PlanSubject, blind_guesses
 from phyblock.tracks.measures import SampleCounts
 from phyblock.tracks.pictures import Drawing, Workshop, picture_style
@@ -250,7 +238,7 @@ class PastStep:
 
 STEP_OUTCOMES = ("placed", *ERROR_TYPES, "invalid", "unread", "done")
 """Outcomes of steps in tables; `unread` are replies without a single parsed operation."""
-_SAME = (f"tracks.step_planning.{ENGINE}",)
+_SAME = (f"tracks.step_planning.{base.ENGINE}",)
 
 
 def _episodes(record: EpisodeRecord) -> tuple[int, ...]:
@@ -311,13 +299,9 @@ class StepPlanning(SceneTrack):
         """Return the choices of a person: the candidates, then Done."""
         n = len(subject.candidates)
         return Picking(
-            (*candidate_choices(n), Choice("Done", "the goal is complete")),
-            least=1,
-            most=1,
-            repeats=False,
-            noun="step",
-            write=lambda picks: step_text(picks[0].place + 1 if picks[0].place < n else None),
-            task="Pick the next block to place, or Done when the goal is complete.",
+            (*base.candidate_choices(n), Choice("Done", "the goal is complete")),
+            lambda picks: step_text(picks[0].place + 1 if picks[0].place < n else None),
+            "Pick the next block to place, or Done when the goal is complete.",
         )
 
     def open(self) -> None:
@@ -510,7 +494,7 @@ class StepEpisode:
         for setting in self._track.suite.settings:
             chosen, candidates = assembly.chosen, self._task.candidates
             placed = placed_counts(scene, candidates, setting, chosen, on_ground)
-            attempted = attempted_counts(placed, len(plan))
+            attempted = Counts(placed.tp, len(plan) - placed.tp, placed.fn)
             for name, counts, wrong in (("placed", placed, None), ("attempted", attempted, errors)):
                 way = {"criterion": name, "matcher": None, "setting": setting}
                 scores.append({**way, **vars(counts), "errors": wrong})

@@ -10,9 +10,8 @@ from rich.cells import cell_len
 from phyblock.cli.console import make_console, print_table
 from phyblock.cli.run import ProgressView
 from phyblock.models.model import ModelEvent
-from phyblock.results.export import write_csv
 from phyblock.results.load import load_run
-from phyblock.results.tables import write_tables
+from phyblock.results.tables import write_csv, write_tables
 from phyblock.results.text import Column, TextTable
 from phyblock.run.runner import RunStarted
 from tests.web.factory import LEVELS, manifest, record, score, write_run

@@ -14,7 +14,7 @@ from phyblock.data import official
 from phyblock.data.official import match_published, read_official, read_official_questions
 from phyblock.data.scenes import read_builtin
 from phyblock.errors import DataError
-from phyblock.results.paper import published_table
+from phyblock.results.tables import published_table
 from tests.data.broken import sound_scene, with_value, write_checkout, write_scenes
 from tests.workspace import problem_of
 

@@ -19,7 +19,7 @@ import pytest
 import phyblock
 from phyblock.errors import SpecError
 from phyblock.parsing.plan import parse_plan
-from phyblock.scoring.plan import AssemblyScorer
+from phyblock.scoring.plan import AssemblyScorer, Counts
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.shipped import reply_texts
@@ -49,7 +49,7 @@ def expected(official_checkout, known):
         scorer = scorers.setdefault(key, AssemblyScorer(item.scene, item.candidates, ("A",)))
         plan = parse_plan(text, len(item.candidates), "official").plan
         (score,) = scorer.score(plan, ("paper",), None)
-        found[model, key] = score.f1 or 0.0
+        found[model, key] = Counts(score["tp"], score["fp"], score["fn"]).f1 or 0.0
     assert len(found) == 3190
     return found
 

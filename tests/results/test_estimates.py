@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from phyblock.data.official import match_published
 from phyblock.domain.question import CATEGORIES, SUBTASKS
 from phyblock.results.load import load_run
-from phyblock.results.paper import beside_paper, published_frame
+from phyblock.results.tables import beside_paper, published_frame
 from phyblock.scoring.plan import Counts
 from tests.web.factory import asked, laws, manifest, record, record_lists, run_of, score, write_run
 from tests.workspace import csv_rows

@@ -12,8 +12,8 @@ from PIL import Image as PillowImage
 
 from phyblock.domain.question import LETTERS, is_picture_option
 from phyblock.integrations import files
-from phyblock.results.export import export_frame, write_csv
 from phyblock.results.load import load_run
+from phyblock.results.tables import export_frame, write_csv
 from tests.web.factory import LEVELS, asked, manifest, record, score, write_run
 from tests.workspace import csv_rows
 

@@ -14,8 +14,11 @@ from hypothesis import strategies as st
 from phyblock.domain.scene import Block, Candidate, CandidateSet, Plan, Scene
 from phyblock.scoring.plan import Counts, Floats, Goal, match_plan
 from phyblock.scoring.statistics import Clusters
+from phyblock.tracks.step_planning import StepPlanning
 from phyblock.types import Setting
 
+f1_of = next(one.value for one in StepPlanning.report().measures if one.name == "f1")
+"""F1 as tables show it, of counts (..., [tp, fp, fn])."""
 Edges = tuple[frozenset[int], ...]
 
 

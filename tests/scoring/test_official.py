@@ -10,7 +10,7 @@ from phyblock.data.scenes import read_builtin
 from phyblock.domain.question import CATEGORIES
 from phyblock.domain.scene import Plan
 from phyblock.parsing.plan import parse_plan
-from phyblock.results.paper import published_table
+from phyblock.results.tables import published_table
 from phyblock.scoring.plan import AssemblyScorer, Goal, chance, match_plan
 from phyblock.scoring.steps import Assembly, gated
 from phyblock.types import GATINGS, SETTINGS
@@ -31,9 +31,9 @@ def test_known_counts_match_row_for_row(official_dir, official_checkout):
     for (model, name), text in reply_texts(official_checkout).items():
         plan = parse_plan(text, len(tasks[name].candidates), "official").plan
         for one in scorers[name].score(plan, ("paper",), "membership") if model in models else ():
-            level = 1 if one.criterion == "membership" else tasks[name].scene.level
-            counts = map(str, (level, one.tp, one.fp, one.fn))
-            found.add((model, name, one.setting, one.criterion, *counts))
+            level = 1 if one["criterion"] == "membership" else tasks[name].scene.level
+            counts = map(str, (level, one["tp"], one["fp"], one["fn"]))
+            found.add((model, name, one["setting"], one["criterion"], *counts))
     assert found == known
 
 

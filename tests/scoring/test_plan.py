@@ -12,6 +12,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from phyblock.domain.scene import Candidate, CandidateSet, Plan, Scene
+from phyblock.records.record import Score
 from phyblock.scoring import plan as scoring
 from phyblock.scoring.plan import AssemblyScorer, Counts, Goal, match_plan
 from phyblock.types import LEVEL1_CRITERIA, MATCHERS, SETTINGS
@@ -122,12 +123,12 @@ def test_the_scorer_says_what_its_parts_say(case, level1):
         if level1 is not None and 1 in case.scene.levels:
             counts = scoring.level1_counts(goal, case.plan, level1)
             expected.append((level1, setting, None, counts, None))
-    found = [
+    found = [Score(**fields) for fields in scores]
+    assert [
         (one.criterion, one.setting, one.matcher, Counts(one.tp, one.fp, one.fn), one.placed)
-        for one in scores
-    ]
-    assert found == expected
-    for score in scores:
+        for one in found
+    ] == expected
+    for score in found:
         if score.criterion == "aov":
             assert (sum(score.errors.values()), len(score.why)) == (score.fp, len(case.plan))
         else:

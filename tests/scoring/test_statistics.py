@@ -8,8 +8,8 @@ from hypothesis.extra import numpy as hnp
 from scipy import stats
 
 from phyblock.scoring import statistics
-from phyblock.scoring.plan import f1_of, ratio_of
-from tests.scoring.cases import World
+from phyblock.scoring.plan import ratio_of
+from tests.scoring.cases import World, f1_of
 
 NAMES = st.lists(st.sampled_from("abcdefg"), min_size=1, max_size=3)
 MEMBERS = st.lists(NAMES, min_size=2, max_size=12)

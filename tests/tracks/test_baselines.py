@@ -208,7 +208,7 @@ def test_numbers_that_are_lacking_or_not_allowed_are_refused(numbers):
 @given(st.lists(st.integers(-2, 6), max_size=5), st.booleans())
 def test_picks_that_make_no_answer_are_refused(picks, repeats):
     choices = FullPlanning.by_hand(PlanSubject(TASK.scene, TASK.candidates)).choices[:4]
-    picking = Picking(choices, 1, 3, repeats, "step", lambda them: [pick.place for pick in them])
+    picking = Picking(choices, lambda them: [pick.place for pick in them], most=3, repeats=repeats)
     is_right = 1 <= len(picks) <= 3 and {*picks} <= {0, 1, 2, 3}
     if is_right and (repeats or len(set(picks)) == len(picks)):
         assert picking.reply(list(map(Pick, picks))) == picks
