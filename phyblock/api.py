@@ -23,16 +23,9 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, NamedTuple, ParamSpec, TypeVar, overload
 
 import numpy as np
+import pydantic
 from PIL import Image
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Field,
-    InstanceOf,
-    SkipValidation,
-    ValidationError,
-    validate_call,
-)
+from pydantic import Field, InstanceOf, SkipValidation
 
 from phyblock.config.models import load_models
 from phyblock.config.suite import Suite
@@ -68,13 +61,12 @@ Place = _Text | Path
 Split = Literal["test", "train", "dev"]
 _SUITES = {"step_planning": "steps", "vqa": "vqa", "pose_planning": "pose"}
 """Bundled suites with the settings of a track; all other tracks use `full`."""
-_MOST_REPEATS = 50
-"""Repeated scenes in a row after which a split is taken to be exhausted."""
+_MOST_REPEATS = 50  # Repeated scenes in a row after which a split is taken to be exhausted.
 
 
 def checked(function: Callable[_P, _T]) -> Callable[_P, _T]:
     """Decorate a function to raise SpecError for arguments that do not have the declared types."""
-    check: Callable[..., _T] = validate_call(config=ConfigDict(strict=True))(function)
+    check: Callable[..., _T] = pydantic.validate_call(config={"strict": True})(function)
     declared = inspect.signature(function).parameters.values()
     names = [one.name for one in declared if one.kind is not one.KEYWORD_ONLY]
 
@@ -89,9 +81,9 @@ def checked(function: Callable[_P, _T]) -> Callable[_P, _T]:
     def checked(*args: _P.args, **kwargs: _P.kwargs) -> _T:
         try:
             return check(*args, **kwargs)
-        except ValidationError as error:
+        except pydantic.ValidationError as error:
             given: dict[Any, Any] = dict(enumerate(args)) | dict(kwargs)
-            problems = problems_of(error, BaseModel, given, function.__name__)
+            problems = problems_of(error, pydantic.BaseModel, given, function.__name__)
             raise SpecError(map(named, problems)) from None
 
     return checked
@@ -599,8 +591,7 @@ def run_suite(
     that were stopped, and of samples that are left, rejected or not judged.
 
     Raises InputError for invalid input before any call. An interrupt stops new calls, waits for
-    those in progress (unless it comes twice), and raises KeyboardInterrupt once all replies are on
-    disk.
+    those in progress unless it comes twice, and raises KeyboardInterrupt with all replies on disk.
     """
     loaded = suite if isinstance(suite, Suite) else load_suite(suite)
     named = None if models_file is None else str(models_file)

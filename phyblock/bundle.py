@@ -23,25 +23,10 @@ from importlib.metadata import version
 from itertools import zip_longest
 from pathlib import Path
 
+from phyblock import files
 from phyblock.config.yaml import dump_yaml
 from phyblock.errors import DataError, InputError, Problem, SpecError, StoreError, reason_of
-from phyblock.files import (
-    OutFolder,
-    bundled,
-    digest_of_file,
-    load_json,
-    open_regular,
-    read_bytes,
-    write_named,
-)
-from phyblock.records.files import (
-    MANIFEST,
-    RECORDS,
-    Manifest,
-    read_manifest,
-    read_records,
-    suite_of,
-)
+from phyblock.records.files import MANIFEST, RECORDS, Manifest, read_manifest, read_records
 from phyblock.records.record import Record
 from phyblock.results.load import design_of
 from phyblock.run.manifest import portable_manifest, without_paths
@@ -95,8 +80,8 @@ def bundle_run(folder: Path, out: Path | None = None) -> Path:
         file.seek(0)
         packed = iter(partial(file.read, _MB), b"")
         if out is None:
-            return OutFolder(folder).write({BUNDLE_FILE: packed})[0]
-        write_named(out, packed)
+            return files.OutFolder(folder).write({BUNDLE_FILE: packed})[0]
+        files.write_named(out, packed)
         return out
 
 
@@ -169,12 +154,12 @@ def _localized(folder: Path, manifest: Manifest, data: Sequence[Path]) -> Manife
     Takes the first of the folders `data` and the bundled sets that has the data of the run. Raises
     DataError naming what is missing, StoreError for a broken manifest.
     """
-    suite = suite_of(manifest, str(folder / MANIFEST))
+    suite = design_of(manifest, str(folder / MANIFEST)).suite
     for part, noun in (("dataset", "data set"), ("questions", "questions")):
         if (held := getattr(manifest, part)) is None:
             continue
         name = held.name if part == "dataset" else held.root
-        ours = [path for path in bundled("benchmarks", "data").iterdir() if path.name == name]
+        ours = [path for path in files.bundled("benchmarks", "data").iterdir() if path.name == name]
         for path in filter(Path.is_dir, (*data, *ours)):
             moved = held.model_copy(update={"root": str(path)})
             here = manifest.model_copy(update={part: moved})
@@ -206,7 +191,7 @@ def portable(record: Record) -> Record:
 def unpack(path: Path, folder: Path) -> str:
     """Unpack a bundle; return the version that made it. Raises StoreError if it is broken."""
     try:
-        with open_regular(path) as file:
+        with files.open_regular(path) as file:
             if file.seek(0, io.SEEK_END) > _LARGEST_BYTES:
                 raise ValueError(f"is larger than {_LARGEST_BYTES // _MB} MB")
             with zipfile.ZipFile(file) as archive:
@@ -219,8 +204,8 @@ def unpack(path: Path, folder: Path) -> str:
                         raise ValueError(f"{info.filename} is too large, or its packing unknown")
                     with archive.open(info) as packed, (folder / info.filename).open("xb") as out:
                         shutil.copyfileobj(packed, out)
-        about = load_json(read_bytes(folder / ABOUT))
-        digests = {name: digest_of_file(folder / name) for name in (MANIFEST, RECORDS)}
+        about = files.load_json(files.read_bytes(folder / ABOUT))
+        digests = {name: files.digest_of_file(folder / name) for name in (MANIFEST, RECORDS)}
         if not isinstance(about, dict) or (about.get("format"), about.get("files")) != (1, digests):
             raise ValueError(f"the digests in {ABOUT} do not match the other members")
         return str(about.get("phyblock"))

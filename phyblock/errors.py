@@ -1,19 +1,4 @@
-"""Every exception that phyblock raises on purpose and lets a caller see.
-
-PhyblockError
-├── InputError              what the user gave is wrong (exit code 2)
-│   ├── SpecError           a suite, a models file or a --set override
-│   ├── DataError           a data set, a scene, a candidate set, a recorded reply
-│   ├── PromptError         a prompt template, or an official prompt that cannot be read
-│   └── StoreError          a run folder, a record, the reply cache, the disk
-├── ModelError              a call to a model failed
-│   ├── RetryableError      429, 5xx, connection, timeout, malformed body: ask again
-│   ├── SampleError         this request will never succeed (400): continue with the next
-│   │   └── RefusedError    the provider's content policy refused it
-│   └── UnavailableError    this model will never answer (401, 403, unknown): stop the model
-├── BudgetReachedError      the next call could exceed the cost limit; it was not made
-└── SimulationError         the physics engine could not do what was asked
-"""
+"""Every exception that phyblock raises on purpose and lets a caller see."""
 
 from __future__ import annotations
 
@@ -22,16 +7,14 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
-_LONGEST_PART = 2000
-"""Characters that are shown of each part of a problem."""
+_LONGEST_PART = 2000  # Characters that are shown of each part of a problem.
 
 
 @dataclass(frozen=True)
 class Problem:
     """One thing that is wrong with an input, worded so that it can be fixed.
 
-    `where` names the file and, where known, line and column (`suite.yaml:3:5`); `field` the
-    dotted field; `found` and `allowed` are shown as given.
+    `where` names the file, with line and column if known (`suite.yaml:3:5`); `field` is dotted.
     """
 
     where: str
@@ -76,7 +59,7 @@ class PhyblockError(Exception):
 
 
 class InputError(PhyblockError):
-    """Something the user gave is wrong; `problems` holds all that was found, at least one."""
+    """What the user gave is wrong (exit code 2); `problems` holds all that was found."""
 
     def __init__(self, problems: Problem | Iterable[Problem]) -> None:
         self.problems = (problems,) if isinstance(problems, Problem) else tuple(problems)
@@ -88,7 +71,7 @@ class InputError(PhyblockError):
 
 
 class SpecError(InputError):
-    """A suite, a models file or an override is not valid."""
+    """A suite, a models file or a --set override is not valid."""
 
 
 class DataError(InputError):
@@ -100,7 +83,7 @@ class PromptError(InputError):
 
 
 class StoreError(InputError):
-    """A run folder or the reply cache cannot be read or written."""
+    """A run folder, a record, the reply cache or the disk cannot be read or written."""
 
 
 Sent = Literal["no", "lost", "maybe", "answered"]
@@ -133,11 +116,11 @@ class ModelError(PhyblockError):
 
 
 class RetryableError(ModelError):
-    """The call may succeed when it is sent again."""
+    """The call may succeed when sent again: 429, 5xx, connection, timeout, malformed body."""
 
 
 class SampleError(ModelError):
-    """This request can never succeed; other requests to the model may."""
+    """This request can never succeed (400); other requests to the model may."""
 
 
 class RefusedError(SampleError):
@@ -145,11 +128,11 @@ class RefusedError(SampleError):
 
 
 class UnavailableError(ModelError):
-    """This model cannot answer at all: bad key, no permission, unknown name."""
+    """This model cannot answer at all (401, 403, unknown name): no more is asked of it."""
 
 
 class BudgetReachedError(PhyblockError):
-    """The next call could bring the cost above the limit; it was not made."""
+    """The next call could exceed the cost limit; it was not made."""
 
 
 class SimulationError(PhyblockError):

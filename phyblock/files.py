@@ -6,8 +6,7 @@ Guarantees:
   limits far above what a legitimate file needs. They raise OSError for failures of the disk, and
   ValueError for refused contents, with a text that can be shown to users.
 * A kill at any moment leaves the old file or the new one, whole (`atomic_write`).
-* In a folder that may hold files of the user (`OutFolder`), only files that phyblock wrote are
-  overwritten or removed, and links are never followed.
+* Files of the user in a folder are never overwritten or removed (`OutFolder`).
 """
 
 from __future__ import annotations
@@ -174,11 +173,8 @@ def open_picture(data: bytes, where: str) -> Image:
         found = f"a file that begins with {data[:12]!r}" if data else "an empty file"
         raise _no_picture(where, error, found) from error
     width, height = picture.size
-    if (
-        min(width, height) < _SIDES_PX[0]
-        or max(width, height) > _SIDES_PX[1]
-        or (width * height > _MOST_PIXELS)
-    ):
+    (least, most), all_px = _SIDES_PX, width * height
+    if not (least <= min(width, height) <= max(width, height) <= most and all_px <= _MOST_PIXELS):
         picture.close()
         found, allowed = f"{width:,} x {height:,} pixels", _SIZES_ALLOWED
         raise DataError(Problem(where, "is a picture of a bad size", "", found, allowed))

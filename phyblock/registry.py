@@ -65,9 +65,7 @@ def added_measures(track: str) -> tuple[Any, ...]:
 
 
 def add_baseline(track: str, name: str, rule: Callable[..., str]) -> None:
-    """Add a rule that answers instead of a model, from the subject of a request and a random
-    generator. Raises ValueError if the name is taken.
-    """
+    """Add a rule from a request's subject and a random generator to a reply. Raises ValueError."""
     if name in track_baselines(known_track(track)):
         raise ValueError(f"the track {track} has a baseline of this name: {name}")
     _baselines.setdefault(track, {})[name] = rule

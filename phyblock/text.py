@@ -82,7 +82,6 @@ def drawn_bytes(*words: object) -> bytes:
 def plain_sum(values: Iterable[_N]) -> _N:
     """Return the sum of values, added one after another and rounded each time.
 
-    From Python 3.12 on, `sum` compensates for rounding, so that its last digits may differ. Values
-    that enter data, records or tables are summed here.
+    From Python 3.12 on, `sum` compensates for rounding: last digits of data or tables would differ.
     """
     return functools.reduce(operator.add, values, 0)

@@ -304,7 +304,7 @@ def test_a_bundle_that_is_killed_leaves_nothing_behind(made, tmp_path):
     code = (
         "import os, signal, sys, phyblock.bundle as bundle\n"
         "from pathlib import Path\n"
-        "bundle.write_named = lambda *_: os.kill(os.getpid(), signal.SIGKILL)\n"
+        "bundle.files.write_named = lambda *_: os.kill(os.getpid(), signal.SIGKILL)\n"
         "bundle.bundle_run(Path(sys.argv[1]), Path(sys.argv[2]))\n"
     )
     for name in ("scratch", "out"):

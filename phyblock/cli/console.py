@@ -31,8 +31,7 @@ T = TypeVar("T")
 INTERRUPTED = 130
 """The exit code after Ctrl-C."""
 _PIPE_WIDTH = 160
-_TEXT_WIDTH = 24
-"""Characters after which a cell of text may wrap."""
+_TEXT_WIDTH = 24  # Characters after which a cell of text may wrap.
 
 
 class _PlainConsole(Console):

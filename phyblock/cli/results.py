@@ -17,9 +17,6 @@ from phyblock.text import counted, one_line, some_of
 if TYPE_CHECKING:
     from phyblock.records.record import Record
 
-_FAILURES = 4
-"""Maximum number of messages of failed calls that are shown."""
-
 
 @click.command()
 @ui.run_argument
@@ -71,7 +68,7 @@ def show_tables(folder: Path, data: Path | None = None, *, page: bool = True) ->
     console, (tables, blind, failures) = ui.make_console(), summary_of(written.run)
     for table in tables:
         ui.print_table(console, table)
-    for model, message, times in failures[:_FAILURES]:
+    for model, message, times in failures[:4]:
         console.print(one_line(f"{times:,} x {model}: {message}"), style="yellow")
     for sentence in blind:
         console.print(sentence)
@@ -215,8 +212,7 @@ def compare(
 def figures(
     run: Path, names: tuple[str, ...], width: float, no_title: bool, out: Path | None
 ) -> None:
-    """Draw figures of the folder RUN for a paper: PDF and SVG with real text, PNG for slides, and
-    captions as plain text.
+    """Draw figures of the folder RUN for a paper: PDF and SVG with real text, PNG, captions.
 
     Draws all figures that the run has numbers for, or those named with --only.
     """
@@ -283,8 +279,7 @@ def verify(file: Path, data: tuple[Path, ...]) -> None:
 @ui.data_folders_option
 @click.option("--title", default="PhyBlock leaderboard", help="Its title.")
 def site(runs: tuple[Path, ...], out: Path, data: tuple[Path, ...], title: str) -> None:
-    """Write RUNS (run folders and bundles) as one static folder: ranks, a page for every model
-    and scene, and every sample step by step.
+    """Write RUNS, folders and bundles, as one static folder: ranks, models, scenes and samples.
 
     The folder opens from disk or from any web server. Runs must use one version of the data and one
     prompt. Bundles are scored again first, and those that do not verify are refused.

@@ -43,10 +43,8 @@ from phyblock.tracks.base import kind_of
 from phyblock.workers import open_workers
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
-_LINE_EVERY_S = 10.0
-"""Interval of progress lines where no bar is shown [s]."""
-_SHOWN_EVERY_S = 0.1
-"""Minimum time between two updates of the display [s]."""
+_LINE_EVERY_S = 10.0  # Interval of progress lines where no bar is shown [s].
+_SHOWN_EVERY_S = 0.1  # Minimum time between two updates of the display [s].
 
 
 @click.command(epilog=f"Bundled suites: {', '.join(plans.bundled_suites())}.")

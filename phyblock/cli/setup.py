@@ -72,8 +72,7 @@ def init(folder: Path, suite: str) -> None:
 @ui.sets_option
 @ui.models_file_option
 def validate(files: tuple[Path, ...], sets: tuple[str, ...], models_file: str | None) -> None:
-    """Check FILES: suites (or names of bundled ones) and models files, data set folders, official
-    checkouts.
+    """Check FILES: suites or names of bundled ones, models files, data sets, official checkouts.
 
     Shows all problems of all files; exits with 2 if there are any.
     """

@@ -37,10 +37,8 @@ DENSITY_KG_M3 = 1040.0
 """ABS plastic, paper appendix A.1."""
 FRICTION = 0.35
 """Coulomb coefficient of a pair of blocks, paper appendix A.1."""
-_LONG = 1.5
-"""A block is long if its longest side is more than this many times the second longest."""
-_MOST_SEEN_TURNS = 8
-"""In a prism with more sides, a turn by one side can hardly be seen."""
+_LONG = 1.5  # A block is long if its longest side is more than this many times the second longest.
+_MOST_SEEN_TURNS = 8  # In a prism with more sides, a turn by one side can hardly be seen.
 
 
 @dataclass(frozen=True, eq=False)
@@ -329,9 +327,7 @@ def add_shape(name: str, shape: Shape) -> None:
 
 
 KIT_PALETTE: tuple[tuple[BlockType, Color], ...] = tuple(
-    sorted(
-        (block_type, color) for block_type, shape in SHAPES.items() for color in shape.kit_colors
-    )
+    sorted((name, color) for name, shape in SHAPES.items() for color in shape.kit_colors)
 )
 """The pairs of type and color of the official kit."""
 
@@ -398,8 +394,7 @@ def symmetries(block_type: BlockType) -> NDArray[np.float64]:
 def orientation_class(block_type: BlockType, euler_deg: Euler) -> tuple[float, ...]:
     """Canonical name of an orientation: equal for two orientations in which the block looks equal.
 
-    The least, in lexicographic order, of the nine matrix entries (rounded to 1e-4) over all
-    rotations that are indistinguishable from the given one.
+    The least nine matrix entries (rounded to 1e-4) of all rotations that look like the given one.
     """
     rotation = euler_deg_to_matrix(euler_deg)
     equivalent = np.round(rotation @ symmetries(block_type), 4) + 0.0

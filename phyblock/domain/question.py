@@ -80,10 +80,9 @@ class QuestionPicture:
     """The recipe of a picture: its blocks, camera and background.
 
     `label` is `scene`, the letter of the option that it is (`A` to `D`), or `block` for the block
-    asked about. `blocks` are drawn at the poses they have here, which need not be goal poses;
-    `view_deg` is the camera's azimuth and elevation [degrees]; the camera is framed on `framed`, or
-    on `blocks` where that is empty, so that pictures to be compared share a camera. `background` is
-    None for the background of the run.
+    asked about. `blocks` are drawn at these poses, which need not be goal poses; `view_deg` is the
+    camera's azimuth and elevation [degrees]; it is framed on `framed`, or else on `blocks`, so that
+    pictures to be compared share a camera. `background` is None for that of the run.
     """
 
     label: str

@@ -375,17 +375,11 @@ def _form(blocks: Sequence[Block], symmetry: Symmetry) -> tuple[tuple[object, ..
     places = np.array([image_m(block.position_m, symmetry) for block in blocks])
     places[:, :2] -= places[:, :2].min(axis=0)
     steps = np.floor(places / _STEP_M + _PHASE).astype(int)
-    return tuple(
-        sorted(
-            (
-                block.type,
-                block.color,
-                pose_class(block.type, image_deg(block.euler_deg, symmetry)),
-                *place,
-            )
-            for block, place in zip(blocks, steps.tolist(), strict=True)
-        )
+    named = (
+        (b.type, b.color, pose_class(b.type, image_deg(b.euler_deg, symmetry)), *place)
+        for b, place in zip(blocks, steps.tolist(), strict=True)
     )
+    return tuple(sorted(named))
 
 
 def _neat(angle_rad: float) -> float:

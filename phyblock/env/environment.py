@@ -54,14 +54,12 @@ TRAITS = 9
 """Presence, type, color, three angles, three coordinates."""
 _PICTURES = ("goal", "candidates", "current")
 """Pictures of an observation, with the names and order of the step planning prompt."""
-_KEPT_PICTURES = 64
-"""Cached pictures of one scene; 50 MB at 512 pixels."""
+_KEPT_PICTURES = 64  # Cached pictures of one scene; 50 MB at 512 pixels.
 _MOST_CHARACTERS = 1 << 20
 _SMALLEST_PX = 16
 _LEVELS = (1, 2, 3, 4, 5)
 _CM = 100.0
-_NEAR = (1.0, 10.0)
-"""Distance and angle within which a block has reached its place [cm, degrees]."""
+_NEAR = (1.0, 10.0)  # Distance and angle within which a block has reached its place [cm, degrees].
 
 
 def _rows(blocks: Sequence[Block] | Sequence[Candidate], most: int) -> NDArray[np.float32]:
@@ -150,7 +148,7 @@ class _BlockPlay:
 
 class _PosePlay:
     """Assembly with poses, after `begin`: blocks are released at the positions of actions, with the
-    tolerances of `ExecutionLimits`; a goal block is reached by one of its kind within `_NEAR`.
+    tolerances of `EXECUTION_LIMITS`; a goal block is reached by one of its kind within `_NEAR`.
     """
 
     def __init__(self, style: PictureStyle, *, is_strict: bool) -> None:

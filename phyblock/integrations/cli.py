@@ -38,8 +38,7 @@ def export(
     data: str,
     limit: int | None,
 ) -> None:
-    """Write the records of the folder RUN, or scenes or questions with their pictures, for other
-    tools.
+    """Write records of the folder RUN, or scenes or questions with pictures, for other tools.
 
     hf: Parquet and a card, for `datasets.load_dataset`. csv: one row per sample. vlmevalkit: a TSV
     file. lmms-eval: a folder for --include_path.

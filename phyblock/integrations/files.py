@@ -9,14 +9,14 @@ from __future__ import annotations
 import base64
 import functools
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import pandas as pd
 from PIL import Image
 
-from phyblock.api import Task, tasks
+from phyblock.api import Task, Tasks, tasks
 from phyblock.data.scenes import StoredScene
 from phyblock.domain.question import LETTERS, is_picture_option
 from phyblock.errors import Problem, SpecError
@@ -24,9 +24,7 @@ from phyblock.files import OutFolder
 from phyblock.sim.pictures import PictureStyle, candidates_png, goal_png, goal_style
 
 
-def write_scenes(
-    folder: Path, data: str, limit: int | None, size_px: int = 512
-) -> tuple[Path, ...]:
+def write_scenes(folder: Path, data: str, limit: int | None) -> tuple[Path, ...]:
     """Write the scenes of a data set with their pictures; return the paths.
 
     Raises StoreError if the folder cannot be written or a file of others would be overwritten,
@@ -35,7 +33,7 @@ def write_scenes(
 
     def row(task: Task) -> dict[str, Any]:
         given = task.item
-        style = goal_style(given.scene, PictureStyle(size_px))
+        style = goal_style(given.scene, PictureStyle())
         return {
             "id": task.key,
             "levels": list(given.scene.levels),
@@ -50,9 +48,7 @@ def write_scenes(
     return write_parquet(folder, "scenes", pd.DataFrame(rows))
 
 
-def write_questions(
-    folder: Path, questions: str, data: str, limit: int | None, size_px: int = 512
-) -> tuple[Path, ...]:
+def write_questions(folder: Path, questions: str, data: str, limit: int | None) -> tuple[Path, ...]:
     """Write a bundled set or folder of questions with pictures; raises as `write_scenes`."""
 
     def row(task: Task) -> dict[str, Any]:
@@ -69,14 +65,13 @@ def write_questions(
             "images": [{"bytes": image.data, "path": f"{image.label}.png"} for image in images],
         }
 
-    rows = map(row, question_tasks(questions, data, limit, size_px))
+    rows = map(row, question_tasks(questions, data, limit))
     return write_parquet(folder, "questions", pd.DataFrame(rows))
 
 
-def question_tasks(questions: str, data: str, limit: int | None, size_px: int) -> Iterator[Task]:
-    """Yield the questions of a bundled set or folder, with pictures of this size."""
-    given = (f"vqa.path={json.dumps(questions)}", f"images.size_px={size_px}")
-    yield from tasks("vqa", *given, data=data, limit=limit)
+def question_tasks(questions: str, data: str, limit: int | None) -> Tasks:
+    """Return the questions of a bundled set or folder."""
+    return tasks("vqa", f"vqa.path={json.dumps(questions)}", data=data, limit=limit)
 
 
 def write_parquet(folder: Path, kind: str, rows: pd.DataFrame) -> tuple[Path, ...]:
@@ -92,7 +87,7 @@ def write_parquet(folder: Path, kind: str, rows: pd.DataFrame) -> tuple[Path, ..
 
 
 def write_vlmevalkit(
-    folder: Path, questions: str, data: str, limit: int | None, size_px: int = 512
+    folder: Path, questions: str, data: str, limit: int | None
 ) -> tuple[Path, ...]:
     """Write multiple-choice questions as a TSV file, not those of ordering; return the paths.
 
@@ -112,18 +107,15 @@ def write_vlmevalkit(
             for letter, option in zip(LETTERS, asked.options, strict=True)
         ]
         return {
-            **{
-                "index": asked.id,
-                "question": asked.text,
-                **dict(zip(LETTERS, options, strict=True)),
-            },
+            **{"index": asked.id, "question": asked.text},
+            **dict(zip(LETTERS, options, strict=True)),
             **{"answer": asked.answer_letters, "category": asked.subtask},
             **{"l2-category": asked.category, "scene": asked.scene.id},
             "image": repr(coded) if len(images) > 1 else coded[0],
             "image_path": repr(names) if len(images) > 1 else names[0],
         }
 
-    asked_of = question_tasks(questions, data, limit, size_px)
+    asked_of = question_tasks(questions, data, limit)
     rows = [row(task) for task in asked_of if len(task.item.question.answer) == 1]
     table = pd.DataFrame(rows).to_csv(sep="\t", index=False)
     return OutFolder(folder).write({"PhyBlock_MCQ.tsv": table})

@@ -20,8 +20,7 @@ from phyblock.domain.scene import Plan, PoseStep
 from phyblock.parsing.text import AnswerForm, answer_of, is_open, plain_lines, whole_number
 from phyblock.types import PlanParser
 
-_REPLIES_KEPT = 1024
-"""Cached replies: rules, and models at several seeds, often give the same one."""
+_REPLIES_KEPT = 1024  # Cached replies: rules, and models at several seeds, often give the same one.
 
 PlanProblem = Literal["empty", "thoughts_only", "no_plan"]
 

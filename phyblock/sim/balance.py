@@ -120,8 +120,7 @@ def prove(blocks: Sequence[Block]) -> Proven | None:
 
 
 def _borne(blocks: Sequence[Block]) -> list[tuple[_Contacts, Floats]] | None:
-    """The contacts as they are, and narrower, each with forces (k, m) that bear its part of
-    `certificate.LOADS`; None if there are none.
+    """Contacts as they are, and narrower, each with forces (k, m) that bear its `LOADS`, or None.
 
     All between two shifts, or masses, that can be borne is borne by the mean of their forces.
     """
@@ -160,9 +159,7 @@ def _pushes(forces: Floats, weights: Floats) -> Floats | None:
 
 
 def _least_squares(forces: Floats, weights: Floats) -> tuple[Floats, NDArray[np.bool_]]:
-    """The pushes (k, m) and pulls with the least sum of squares that bear weights, and True for
-    each weight that they bear without a pull.
-    """
+    """Forces (k, m) of least squares that bear weights, and True for each without a pull."""
     # SciPy takes a third of a second to import, and a run without requests does not need it.
     from scipy.linalg import cho_factor, cho_solve  # type: ignore[import-untyped]
 

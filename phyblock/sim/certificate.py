@@ -47,9 +47,7 @@ class Body(NamedTuple):
 
 
 class Contact(NamedTuple):
-    """A place where a body, or the ground, may push another, with three unit vectors: the normal,
-    from one to the other, and two at right angles to it.
-    """
+    """A place where `below` may push `above`, the unit normal that way, and two axes across it."""
 
     below: int
     above: int

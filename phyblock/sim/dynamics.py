@@ -272,19 +272,12 @@ def _arrangement(group: Sequence[Block]) -> tuple[Block, ...]:
     return tuple(kept)
 
 
+EXECUTION_LIMITS = {"overlap_cm": 0.5, "stand_cm": 1.0, "stand_deg": 10.0}
+"""Limits of moving a block out of overlaps, and of movement and turn of a standing block."""
 LONGEST_S = 600.0  # Time after which execution of a plan is given up [s].
 _TRIES = 16
 _CM = 100.0
 _DIGITS = 3
-
-
-@dataclass(frozen=True)
-class ExecutionLimits:
-    """Limits of moving a block out of overlaps, and of movement and turn of a standing block."""
-
-    overlap_cm: float = 0.5
-    stand_cm: float = 1.0
-    stand_deg: float = 10.0
 
 
 @dataclass(frozen=True)
@@ -319,7 +312,6 @@ class Execution:
 
 def execute(
     blocks: Sequence[Block | None],
-    limits: ExecutionLimits | None = None,
     engine: PhysicsEngine | None = None,
     physics: Physics | None = None,
 ) -> Execution:
@@ -330,7 +322,7 @@ def execute(
     give_up_s = time.monotonic() + LONGEST_S
     steps: list[ExecutedStep] = []
     worlds: list[tuple[Block, ...]] = []
-    with Executor(limits, engine, physics) as executor:
+    with Executor(engine, physics) as executor:
         for number, block in enumerate(blocks, 1):
             if time.monotonic() > give_up_s:
                 raise SimulationError(f"step {number} was not reached within {LONGEST_S:g} s")
@@ -348,13 +340,7 @@ class Executor:
     the limits of `DEFAULT_TRIAL`, all poses are restored: drift must not affect later steps.
     """
 
-    def __init__(
-        self,
-        limits: ExecutionLimits | None = None,
-        engine: PhysicsEngine | None = None,
-        physics: Physics | None = None,
-    ) -> None:
-        self._limits = limits or ExecutionLimits()
+    def __init__(self, engine: PhysicsEngine | None = None, physics: Physics | None = None) -> None:
         self._world = open_world(physics, engine)
         self._resting: dict[int, Block] = {}
         self._steps = 0
@@ -376,11 +362,12 @@ class Executor:
         if block is None:
             return ExecutedStep("no_block")
         block = replace(block, order=self._steps)
+        overlap_cm, stand_cm, stand_deg = EXECUTION_LIMITS.values()
         below_cm = -float(bounds_m(block)[0, 2]) * _CM
-        if below_cm > self._limits.overlap_cm:
+        if below_cm > overlap_cm:
             return ExecutedStep("under_floor", overlap_cm=round(below_cm, _DIGITS))
         others = self.blocks
-        most_m = self._limits.overlap_cm / _CM
+        most_m = overlap_cm / _CM
         free, given_m = _out_of_others(block, others, most_m)
         if free is None:
             return ExecutedStep("overlaps", overlap_cm=round(given_m * _CM, _DIGITS))
@@ -388,13 +375,13 @@ class Executor:
         if FIT_TOLERANCE_M < gap_m <= most_m:
             x, y, z = free.position_m
             free = replace(free, position_m=(x, y, z - gap_m))
-        after, stand = self._let_go(free), self._limits
+        after = self._let_go(free)
         moved, fallen = (0.0, 0.0), []
         for one in (*others, block):
             if one.order in after:
                 goal, now = Pose.goal(one), after[one.order]
                 moved = goal.distance_m(now) * _CM, goal.angle_deg(now)
-                if not (moved[0] <= stand.stand_cm and moved[1] <= stand.stand_deg):
+                if not (moved[0] <= stand_cm and moved[1] <= stand_deg):
                     fallen.append(one.order)
         knocked = tuple(order for order in fallen if order != block.order)
         end: StepEnd = "knocks_over" if knocked else "falls" if fallen else "stands"

@@ -1,6 +1,6 @@
 """Geometry of the blocks: meshes, convex pieces, and reproducible arithmetic for pictures.
 
-The profile of a prism in `SHAPES` gives a closed triangle mesh for mass properties, a finer one for
+The profile of a prism in `SHAPES` gives a closed triangle mesh for its inertia, a finer one for
 pictures, and the convex pieces of physics and contact tests. Curved sides are polygons: a smooth
 cylinder rolls away where an 18-gon stands. Pictures show them round.
 
@@ -20,15 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from phyblock.domain.blocks import (
-    SHAPES,
-    BlockType,
-    Euler,
-    Outline,
-    Profile,
-    Shape,
-    euler_deg_to_matrix,
-)
+from phyblock.domain.blocks import SHAPES, BlockType, Euler, Profile, Shape, euler_deg_to_matrix
 from phyblock.domain.scene import Block, CandidateSet, PoseStep
 
 Vectors = NDArray[np.float64]
@@ -118,21 +110,6 @@ class Mesh:
         np.add.at(sums, place, angles[..., None] * self.normals[:, None])
         return rounded(unit(sums[place]))
 
-    @functools.cached_property
-    def volume_m3(self) -> float:
-        """Volume of the solid [m3]."""
-        return float(self._tetrahedra_m3.sum())
-
-    @functools.cached_property
-    def center_of_mass_m(self) -> NDArray[np.float64]:
-        """Center of mass of the solid, shape (3,) [m]."""
-        moments: NDArray[np.float64] = self._tetrahedra_m3 @ self.corners_m.sum(axis=1) / 4
-        return moments / self.volume_m3
-
-    @property
-    def _tetrahedra_m3(self) -> NDArray[np.float64]:
-        return np.linalg.det(self.corners_m) / 6
-
 
 @dataclass(frozen=True, eq=False)
 class ConvexPiece:
@@ -152,13 +129,13 @@ def solid_mesh(block_type: BlockType) -> Mesh:
 @functools.cache
 def principal_inertia_m2(block_type: BlockType) -> tuple[float, float, float]:
     """Moments of inertia of the solid about its body axes through its center, per mass [m2]."""
-    mesh = solid_mesh(block_type)
-    centered = mesh.corners_m - mesh.center_of_mass_m
+    shape = SHAPES[block_type]
+    centered = solid_mesh(block_type).corners_m - np.array(shape.center_of_mass_m)
     volumes = np.linalg.det(centered) / 6
     sums = centered.sum(axis=1)
     second: NDArray[np.float64] = np.einsum("t,tci,tcj->ij", volumes, centered, centered)
     second += np.einsum("t,ti,tj->ij", volumes, sums, sums)
-    second /= 20 * mesh.volume_m3
+    second /= 20 * shape.volume_m3
     x, y, z = map(significant, np.diag(np.trace(second) * np.eye(3) - second).tolist())
     return x, y, z
 
@@ -183,8 +160,8 @@ def _mesh(shape: Shape, profile: Profile) -> Mesh:
     return Mesh(vertices, np.array(triangles))
 
 
-def _cap(shape: Shape, outline: Outline, along_m: float) -> NDArray[np.float64]:
-    """The outline in the body frame at a place along the axis, shape (n, 3) [m]."""
+def _cap(shape: Shape, outline: Vectors, along_m: float) -> Vectors:
+    """The outline (n, 2) in the body frame at a place along the axis, shape (n, 3) [m]."""
     column = 0 if shape.axis == "x" else 2
     return np.insert(outline, column, along_m, axis=1)
 

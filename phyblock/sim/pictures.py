@@ -185,8 +185,7 @@ _LEAST_CUBE = 0.08
 class PictureStyle:
     """Side length [pixels], background, and direction of the camera.
 
-    Azimuth 0 looks from +x and 90 from +y; elevation 90 looks straight down [degrees]. Raises
-    ValueError for values that are not allowed.
+    Azimuth 0 looks from +x, 90 from +y; elevation 90 straight down [degrees]. Raises ValueError.
     """
 
     size_px: int = 512
@@ -423,10 +422,8 @@ def hidden_blocks(scene: Scene) -> tuple[int, ...]:
     return tuple(b.order for b, n in zip(scene.blocks, counts, strict=True) if n < least)
 
 
-RULED_VERSION = 1
-"""Increased whenever the scales change, so that stored pictures are redrawn."""
-KIT_VERSION = 1
-"""Increased whenever the sheet changes, so that stored pictures are redrawn."""
+RULED_VERSION, KIT_VERSION = 1, 1
+"""Increased whenever the scales, or the sheet, change, so that stored pictures are redrawn."""
 
 _CM = 100.0
 _MARGIN_CM = 3.0
@@ -453,8 +450,7 @@ def ruled_png(scene: Scene, style: PictureStyle) -> bytes:
 
 def ruled_key(scene: Scene, style: PictureStyle) -> str:
     """SHA-256 [hex] of everything that the picture depends on."""
-    content = [RULED_VERSION, *looks(scene.blocks)]
-    return picture_key("ruled goal", style, content)
+    return picture_key("ruled goal", style, [RULED_VERSION, *looks(scene.blocks)])
 
 
 class RuledFloor:

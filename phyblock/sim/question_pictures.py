@@ -1,8 +1,7 @@
 """The pictures of questions: from a recipe to a PNG, its key, its marks, and its visible facts.
 
-The same recipe and style give the same bytes, and the key covers everything they depend on. A mark
-is a small target on the surface, a line, and a label at its end, readable on every floor. Pictures
-are compared at 256 pixels, without floor and anti-aliasing.
+The same recipe and style give the same bytes, and the key covers all that they depend on. A mark is
+a target on the surface, a line and a label. Pictures are compared without anti-aliasing.
 """
 
 from __future__ import annotations

@@ -103,10 +103,9 @@ def frame(
 ) -> Camera:
     """The closest camera with these axes that sees all points (n, 3), one at least, in the window.
 
-    For given axes, "every point lies inside this window" is a set of linear inequalities in the
-    camera's position, so the closest camera is a closed form. It stays at least `min_distance_m`
-    [m] from the nearest point. `drawn_m` (k, 3) are all drawn points, if they are more: they may
-    lie outside of the window, but between the camera's planes.
+    For given axes, "every point lies inside this window" means linear inequalities in the camera's
+    position, so the closest camera is a closed form. It is `min_distance_m` [m] or more from every
+    point. `drawn_m` (k, 3) are more points to be between its planes, also outside of the window.
     """
     right, up, forward = turned(points_m, axes).T
     spans = []
@@ -126,8 +125,7 @@ def frame(
     return Camera(eye, axes, near_m * _NEARER, far_m + _DEPTH_MARGIN_M)
 
 
-_AT_ONCE = 1 << 16
-"""Pixels that are processed together, so that their memory is reused."""
+_AT_ONCE = 1 << 16  # Pixels that are processed together, so that their memory is reused.
 _FLAT = 1e-9  # Unit normals that differ by less in each component belong to one plane.
 _LEAST_DEPTH_M = 1e-3
 """Faces nearer to a camera are not drawn, since points behind it cannot be projected."""
@@ -135,8 +133,7 @@ _LIGHT_SCREEN = 0.75
 """Side of the light's picture, as a share of the camera's; props fill all of it."""
 _MARGIN_PX = 2
 _AWAY = -1e-6
-_TOUCHING_M = 5e-5
-"""A point this close behind a face is on it: blocks at rest overlap by less [m]."""
+_TOUCHING_M = 5e-5  # A point this close behind a face is on it: blocks at rest overlap by less [m].
 _TAPS = ((0, 0), (1, 0), (0, 1), (1, 1))
 
 
@@ -165,8 +162,7 @@ class Light:
 class Raster:
     """A drawing: `rgb` shape (size, size, 3), 0..255, row 0 on top; the others (size, size).
 
-    `prop` is the index of the prop in each pixel, or -1; `face` is the number of its face; `shaded`
-    is true where the ground is in shadow, even behind props.
+    `prop` is the prop in each pixel, or -1, `face` its face; `shaded`: the ground is in shadow.
     """
 
     rgb: NDArray[np.uint8]
@@ -359,8 +355,7 @@ def _brightness(
 ) -> Callable[[NDArray[np.int32], Floats, Floats, Floats], Floats]:
     """A function from points of triangles in `front` of a camera to the share of their color.
 
-    It takes the triangle, column, row and depth [m] of each visible point, (n,), in a light that
-    `solid` shades.
+    It takes triangle, column, row and depth [m] of visible points, (n,); `solid` shades them.
     """
     # The cosine to the light is computed at corners, and interpolated between them.
     cosines = dot(front.bends, light.direction)

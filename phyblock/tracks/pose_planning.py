@@ -24,7 +24,7 @@ from phyblock.scoring.plan import AssemblyScorer
 from phyblock.scoring.pose import PoseError, PoseScorer
 from phyblock.sim.balance import is_balanced, surely_stands
 from phyblock.sim.contact import voxel_iou
-from phyblock.sim.dynamics import ExecutionLimits, execute, execution_physics, groups
+from phyblock.sim.dynamics import EXECUTION_LIMITS, execute, execution_physics, groups
 from phyblock.sim.engine import Pose, described_engine
 from phyblock.sim.geometry import box_height_cm, center_cm, origin_m, put
 from phyblock.sim.pictures import goal_style, kit_key, kit_png, ruled_key, ruled_png, written_style
@@ -42,7 +42,7 @@ KIT_LABEL = "blocks"
 """The label of the sheet of candidates."""
 Center = tuple[float, float, float]
 _REACHED = {"reached_cm": 1.0, "reached_deg": 10.0}
-_LIMITS = {**asdict(ExecutionLimits()), **_REACHED}
+_LIMITS = {**EXECUTION_LIMITS, **_REACHED}
 """Tolerances of execution, as records hold them: a goal block is reached if a block of its kind
 ends up at most `reached_cm` from it, turned by at most `reached_deg`."""
 _DIGITS = 4

@@ -38,12 +38,10 @@ from phyblock.sim.pictures import COLOR_RGB, to_png
 from phyblock.text import hex_digest
 from phyblock.web.board import Entry, SiteRun, Sources
 
-_LAYOUT = 7
-"""Version of the scripts."""
+_LAYOUT = 7  # Version of the scripts.
 _CHUNK_CHARACTERS = 400_000
 _DIGITS = 24
-_DECIMALS = 6
-"""Decimals of numbers used for drawing."""
+_DECIMALS = 6  # Decimals of numbers used for drawing.
 PICTURES = "report/pictures/"
 """The folder of sent pictures in a run's folder."""
 _SCRIPTS = (
@@ -59,8 +57,7 @@ _LEFT_OUT = frozenset(
 """Fields of records that the index has, or that a page does not show as they are."""
 _OF_QUESTION = ("subtask", "text", "options", "answer_letters", "pictures", "evidence")
 _CARD_PX = (1200, 630)
-_INSTRUCTIVE_BLOCKS = 6
-"""A failure is most instructive if its goal has about this many blocks."""
+_INSTRUCTIVE_BLOCKS = 6  # A failure is most instructive if its goal has about this many blocks.
 
 
 class Pack:

@@ -23,13 +23,11 @@ from phyblock.web import pack
 from phyblock.web.board import SiteRun, board_of, entries_of, open_sources, short, shortfalls
 
 _FOLDER = "report/"
-_PAGE = (REPORT_FILE, _FOLDER, pack.PICTURES)
-"""The page and the folders beside it in a run folder."""
+_PAGE = (REPORT_FILE, _FOLDER, pack.PICTURES)  # The page and the folders beside it in a run folder.
 INDEX = "index.html"
 _DATA = "data/"
 _CONTROLS = frozenset({"blind", "prompt", "path", "size_px"})
-"""Fields of pictures and of a track's section of the suite that may differ, are shown with the run,
-or are compared by their digest."""
+"""Fields of pictures and of a track's section that may differ, or are compared by digest."""
 _ABOUT = (
     "Can vision-language models build what they see? A model gets a picture of a structure and of "
     "sixteen numbered blocks, and names the blocks to place, in order."
@@ -79,9 +77,7 @@ def report_files(folder: Path) -> dict[str, Path]:
 
 
 def _about(written: TablesWritten) -> dict[str, Any]:
-    """Return the content of a page on one run besides its numbers: facts, all its tables, and
-    `cautions`, warnings to read before any number, most important first.
-    """
+    """Return facts, tables and `cautions` of a run: warnings, the most important first."""
     run, manifest, design = written.run, written.run.manifest, written.run.design
     coverage, stopped, cautions = coverage_frame(run), read_stopped(run.path), []
     expected, recorded = int(coverage["expected"].sum()), int(coverage["recorded"].sum())

@@ -1,9 +1,8 @@
 """The server of a session's page: only on the loopback address, behind a token, for its own pages.
 
-Hosts other than 127.0.0.1 and localhost are refused, so that foreign names that resolve to this
-machine have no access; changes must come from a page of this address. It reads from memory and from
-files that it was given, and writes nothing. A browser is started with an address that works once,
-since others on the machine can read command lines.
+Hosts other than 127.0.0.1 and localhost are refused, so that foreign names of this machine have no
+access; changes must come from a page of this address. It serves memory and given files, and writes
+nothing. A browser gets an address that works once: others can read command lines.
 """
 
 from __future__ import annotations

@@ -48,9 +48,7 @@ Phase = Literal["start", "warmed", "waiting", "question", "paused", "done", "clo
 
 @dataclass(frozen=True)
 class Person:
-    """A person who answers, with a short name. If `is_exact`, the page shows the exact prompt of
-    models, for studies. Raises SpecError for a name with other characters than allowed.
-    """
+    """A person who answers; `is_exact` shows models' prompt. Raises SpecError for a bad name."""
 
     name: str
     is_exact: bool = False

@@ -14,7 +14,7 @@ from phyblock.errors import InputError
 from phyblock.scoring.pose import blocks_reached, overlap_volume
 from phyblock.sim import engine as engines
 from phyblock.sim.contact import voxel_iou
-from phyblock.sim.dynamics import ExecutionLimits, execute
+from phyblock.sim.dynamics import execute
 from phyblock.sim.engine import GRAVITY_M_S2, Physics, Pose
 from tests.sim.structures import block, block_types, counterweighted_beam, eulers, tower
 
@@ -122,14 +122,14 @@ LOW = [at(FIRST, 0, 0, z) for z in (0.01, -0.5, 0.0215)]
 
 
 def test_a_step_stands_falls_or_is_refused(engine):
-    for blocks, limits, wanted in (
-        (tower(3), {}, ["stands", "stands", "stands"]),
-        (tower(3)[2:], {}, ["falls"]),
-        ([FIRST, DEEP, SLIGHT], {}, ["stands", "overlaps", "stands"]),
-        ([FIRST, SLIGHT], {"overlap_cm": 0.3}, ["stands", "overlaps"]),
-        ([*LOW[:2], None, LOW[2]], {}, ["under_floor", "under_floor", "no_block", "stands"]),
+    for blocks, wanted in (
+        (tower(3), ["stands", "stands", "stands"]),
+        (tower(3)[2:], ["falls"]),
+        ([FIRST, DEEP, SLIGHT], ["stands", "overlaps", "stands"]),
+        ([FIRST, at(FIRST, 0.044, 0, 0.025)], ["stands", "overlaps"]),
+        ([*LOW[:2], None, LOW[2]], ["under_floor", "under_floor", "no_block", "stands"]),
     ):
-        done = execute(blocks, ExecutionLimits(**limits), engine)
+        done = execute(blocks, engine)
         assert [step.end for step in done.steps] == wanted
         is_put = [end in ("stands", "falls") for end in wanted]
         assert [len(world) for world in done.worlds] == [*itertools.accumulate(is_put)]
