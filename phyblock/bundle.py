@@ -1,9 +1,8 @@
 """A run as one file that others can score again: its manifest, its records and their digests.
 
 A bundle is a ZIP archive of three members, the same bytes for the same run. It holds no prompts,
-pictures or addresses of servers, only the last part of local paths, and only the kind and status of
-failed requests. A bundle may be hostile: members are known by name and bounded in size, and no path
-in an archive or a manifest is ever read or written.
+pictures or addresses of servers, the last part of local paths, and kind and status of failed
+requests. It may be hostile: members have known names and sizes, and no path in it is ever used.
 """
 
 from __future__ import annotations
@@ -151,8 +150,7 @@ def _differs(where: object, field: str, made_by: str) -> StoreError:
 def _localized(folder: Path, manifest: Manifest, data: Sequence[Path]) -> Manifest:
     """Return the manifest of the run in `folder` with the paths of its data on this machine.
 
-    Takes the first of the folders `data` and the bundled sets that has the data of the run. Raises
-    DataError naming what is missing, StoreError for a broken manifest.
+    Takes the first of `data` and the bundled sets that has the data. Raises DataError, StoreError.
     """
     suite = design_of(manifest, str(folder / MANIFEST)).suite
     for part, noun in (("dataset", "data set"), ("questions", "questions")):

@@ -1,7 +1,6 @@
 """The registry of tracks and their baselines, the only place that names them.
 
-Lower layers look up here what tracks add (sections of a suite, names of baselines) without
-importing them: a track's module is loaded on first use.
+Lower layers look up here what tracks add, without importing them: modules load on first use.
 """
 
 from __future__ import annotations

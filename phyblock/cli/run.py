@@ -25,7 +25,7 @@ from rich.text import Text
 
 from phyblock.cli import console as ui
 from phyblock.cli.results import show_tables
-from phyblock.config.models import load_models
+from phyblock.config.models import HUMAN, load_models
 from phyblock.config.yaml import read_yaml
 from phyblock.errors import Problem, SpecError
 from phyblock.files import OutFolder
@@ -406,10 +406,9 @@ def play(
     from phyblock.results.load import load_run
     from phyblock.web.pages import files_of, report_files
     from phyblock.web.server import Server
-    from phyblock.web.session import Ending, Person, PlaySession, plan_session
+    from phyblock.web.session import Ending, PlaySession, plan_session
 
-    person = Person(name, exact)
-    plan = plan_session(plans.read_suite(suite, sets), person, limit)
+    plan = plan_session(plans.read_suite(suite, sets), name, limit, is_exact=exact)
     folder = out or plan.folder_in(Path("results"))
     if held_run(folder, plan.manifest) is not None:
         OutFolder(folder).check(files_of(page=True))
@@ -426,14 +425,14 @@ def play(
 
     session = PlaySession(plan.samples_per_model)
     with Server(session, port) as server:
-        result = asyncio.run(session.run(plan, person, folder, begun))
+        result = asyncio.run(session.run(plan, folder, begun))
         if result.left:
             console.print(f"{session.done:,} of {plan.samples_per_model:,} tasks are answered.")
             ui.print_again(console)
             return ui.INTERRUPTED
         made = show_tables(folder, page=True)
         server.files = report_files(folder)
-        session.finish(Ending(folder, person.model, beside, plan.dataset.tasks))
+        session.finish(Ending(folder, f"{HUMAN}{name}", beside, plan.dataset.tasks))
         ui.print_path(console, made)
         console.print("All tasks are done; the page shows the results. Ctrl-C ends.", style="dim")
         with contextlib.suppress(KeyboardInterrupt):

@@ -127,8 +127,7 @@ class Question:
 def rotated(question: Question, by: int) -> Question:
     """The same question with option `by` as A, the next as B, and so on cyclically.
 
-    Pictures that are options, and lettered places that the options name, keep their place in the
-    world and take the new letter of their option.
+    Pictures and lettered places that are options keep their place and take their new letter.
     """
     n, options = len(question.options), question.options
     marked = {mark.letter for picture in question.pictures for mark in picture.marks}

@@ -40,8 +40,7 @@ class CycleError(ValueError):
 class AOVGraph:
     """Dependencies of n blocks (paper section 3.2).
 
-    `depends_on[v]` holds the vertices that must be placed before v. Raises ValueError when a
-    vertex is outside 0..n-1 and CycleError when no order of placing exists.
+    `depends_on[v]` is placed before v. Raises ValueError for a vertex outside 0..n-1, CycleError.
     """
 
     depends_on: tuple[frozenset[int], ...]

@@ -112,7 +112,7 @@ class _BlockPlay:
 
     @property
     def has_ended(self) -> bool:
-        return self._assembly.is_complete or (self._is_strict and not self._settled.stands)
+        return self._assembly.is_complete or (self._is_strict and bool(self._settled.fallen))
 
     @property
     def blocks(self) -> tuple[Block, ...]:

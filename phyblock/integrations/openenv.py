@@ -2,8 +2,7 @@
 
     uvicorn --factory phyblock.integrations.openenv:app --port 8000
 
-`PHYBLOCK_TASKS` holds the arguments of `phyblock.tasks` as JSON. `openenv.yaml` and a Dockerfile
-are in the folder `openenv_space` beside this module.
+`PHYBLOCK_TASKS` has the arguments of `phyblock.tasks` as JSON; `openenv_space` has a Dockerfile.
 """
 
 from __future__ import annotations

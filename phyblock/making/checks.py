@@ -131,9 +131,9 @@ def _overlap(facts: SceneFacts) -> Iterator[Finding]:
 
 def _floating(facts: SceneFacts) -> Iterator[Finding]:
     """Blocks with a gap below them."""
-    for gap in find_gaps(facts.scene.blocks, facts.fit_m):
-        message = f"block {gap.order} floats {gap.height_m * 1000:.2f} mm above its support"
-        yield _fault(message, gap.order)
+    for order, height_m in find_gaps(facts.scene.blocks, facts.fit_m).items():
+        message = f"block {order} floats {height_m * 1000:.2f} mm above its support"
+        yield _fault(message, order)
 
 
 def _dependencies(facts: SceneFacts, is_declared: bool) -> Iterator[Finding]:
@@ -154,7 +154,7 @@ def _unstable_step(facts: SceneFacts) -> Iterator[Finding]:
     """Steps of the stored order, before the last one, after which something falls."""
     blocks, first = facts.scene.blocks, replace(facts.trial, physics=facts.trial.physics[:1])
     for count, step in enumerate(dynamics.check_steps(blocks[:-1], first), 1):
-        if not step.stable:
+        if step.fallen:
             when = f"at step {count}, once block {blocks[count - 1].order} is placed"
             yield _fall(step, when, first)
 
@@ -162,7 +162,7 @@ def _unstable_step(facts: SceneFacts) -> Iterator[Finding]:
 def _unstable(facts: SceneFacts) -> Iterator[Finding]:
     """Blocks that fall from the finished structure."""
     whole = check(facts.scene.blocks, facts.trial, facts.quiet_s)
-    if not whole.stable:
+    if whole.fallen:
         differing = "" if whole.agreed else ", not the same ones at every time step"
         yield _fall(whole, f"when all is built{differing}", facts.trial)
 

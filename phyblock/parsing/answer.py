@@ -1,9 +1,8 @@
 """Parsers from reply text to the answer to a question, or to one operation of step planning.
 
-Both return the rule that matched. An answer is in the requested form: JSON, else the last line
-"Answer: X" (a box or a tag counts as one). Otherwise it is the last stated choice, then a single
-letter in the last or first line, then the only named option. An order is the last one that names
-every letter once.
+Both return the rule that matched. An answer has the requested form: JSON, else the last line
+"Answer: X" (or a box or a tag). Otherwise it is the last stated choice, then a single letter in the
+last or first line, then the only named option. An order is the last with every letter once.
 
 An operation, `Move(3)` or `Done`, is JSON of the requested form, else the last line that is only an
 operation, else the text after a label ("Next plan: Move(3)"), else the only one that is mentioned.

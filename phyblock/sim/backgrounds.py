@@ -134,8 +134,7 @@ def _to_floor(camera: Camera, size_px: int) -> tuple[NDArray[np.float32], NDArra
 class Ground:
     """A background: the share of light that a shadow removes, 0..1, and colors.
 
-    `ink` is the color of text, `line` of the grid between candidates, `rim` of outlines between
-    blocks and floor. The floor is drawn by `paint`, or is a `texture`.
+    `ink` colors text, `line` the candidates' grid, `rim` outlines; `paint` or `texture`: the floor.
     """
 
     shadow: float

@@ -111,13 +111,6 @@ class Overlap(NamedTuple):
     depth_m: float
 
 
-class Gap(NamedTuple):
-    """A block (by order) that is `height_m` [m] above what it would fall on."""
-
-    order: int
-    height_m: float
-
-
 def find_overlaps(
     blocks: Sequence[Block], tolerance_m: float = FIT_TOLERANCE_M
 ) -> tuple[Overlap, ...]:
@@ -129,10 +122,10 @@ def find_overlaps(
     return tuple(one for one in found if one.depth_m > tolerance_m)
 
 
-def find_gaps(blocks: Sequence[Block], tolerance_m: float = FIT_TOLERANCE_M) -> tuple[Gap, ...]:
-    """Blocks that are more than `tolerance_m` [m] above the block or ground below them."""
+def find_gaps(blocks: Sequence[Block], tolerance_m: float = FIT_TOLERANCE_M) -> dict[int, float]:
+    """The fall [m] of each block, by order, if it is more than `tolerance_m` [m]."""
     heights_m = {b.order: drop_height_m(b, [o for o in blocks if o is not b]) for b in blocks}
-    return tuple(Gap(order, high) for order, high in heights_m.items() if high > tolerance_m)
+    return {order: high for order, high in heights_m.items() if high > tolerance_m}
 
 
 def drop_height_m(block: Block, others: Sequence[Block]) -> float:

@@ -79,11 +79,6 @@ class Stability:
             agreed=len({one.fallen for one in parts}) <= 1,
         )
 
-    @property
-    def stable(self) -> bool:
-        """True if every block stayed within the limits under every setting."""
-        return not self.fallen
-
 
 # Larger structures have tall columns, which an engine may let creep though they could stand.
 MOST_PROVEN = 22
@@ -204,11 +199,6 @@ class Settled(NamedTuple):
 
     fallen: tuple[int, ...]
     blocks: tuple[Block, ...]
-
-    @property
-    def stands(self) -> bool:
-        """True if every block stayed where it was put."""
-        return not self.fallen
 
 
 def settle(blocks: Sequence[Block], trial: Trial = DEFAULT_TRIAL) -> Settled:

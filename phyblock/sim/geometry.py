@@ -4,10 +4,9 @@ The profile of a prism in `SHAPES` gives a closed triangle mesh for its inertia,
 pictures, and the convex pieces of physics and contact tests. Curved sides are polygons: a smooth
 cylinder rolls away where an 18-gon stands. Pictures show them round.
 
-Matrix products use a BLAS, which sums in another order, and with fused operations, on other
-machines; trigonometric functions differ in the last digit between C libraries. Plain numpy
-arithmetic in 64 bits is the same everywhere, and so are pictures made only with it (`dot`, `cross`,
-`turned`, `unit`) and with a few rounded sines (`rounded`).
+A BLAS sums in another order, and with fused operations, on other machines; C libraries differ in
+the last digit of sines. Plain numpy arithmetic in 64 bits is the same everywhere, and so are
+pictures made only with it (`dot`, `cross`, `turned`, `unit`) and a few rounded sines (`rounded`).
 """
 
 from __future__ import annotations

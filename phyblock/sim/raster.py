@@ -1,8 +1,7 @@
 """Cameras, and the rasterizer: triangles to pixels in numpy, the same bytes on every machine.
 
-All triangles are scanned at once: each row of pixels that a triangle crosses is a span. The nearest
-triangle of each pixel is found by its nearness, a number that is linear over the screen (the
-inverse of depth for a camera; the height towards a distant light).
+All triangles are scanned at once: each row of pixels that one crosses is a span. The nearest one of
+a pixel is found by a number that is linear over the screen (inverse depth, or height to a light).
 """
 
 from __future__ import annotations

@@ -110,9 +110,8 @@ class SiteRun:
 def entries_of(runs: Sequence[SiteRun]) -> tuple[Entry, ...]:
     """Return every model of every run.
 
-    The same model with the same parameters, asked by two runs in different tracks, is one row, and
-    so is a baseline with the same result in several runs. Any other model that runs asked in the
-    same track has a row for each, with the time and identity of the run.
+    A model with the same parameters in different tracks of runs is one row, and so is a baseline
+    with the same result in several. Others have a row for each run, with its time and identity.
     """
     found: list[tuple[dict[str, Any], Entry]] = []
     for number, one in enumerate(runs):

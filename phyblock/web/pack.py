@@ -1,8 +1,7 @@
 """Files of a page: its HTML, and beside it data as scripts, three.js, and pictures as sent.
 
-A page that is opened from disk may load scripts, but not fetch files. A script calls
-`phyblockTake(build, name, text)`; the text is deflated JSON in base 64, so that nothing in a reply
-is ever run as code.
+A page that is opened from disk may load scripts, but not fetch files. Scripts call
+`phyblockTake(build, name, text)` with deflated JSON in base 64: nothing in a reply is run as code.
 """
 
 from __future__ import annotations

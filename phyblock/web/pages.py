@@ -182,9 +182,8 @@ def write_site(
 def open_runs(paths: Sequence[Path], data: Sequence[Path], kept: ExitStack) -> tuple[SiteRun, ...]:
     """Open runs in the order given; bundles stay unpacked as long as `kept` is open.
 
-    `data` are folders to look for data in, besides the paths in manifests and the bundled sets.
-    Raises SpecError for a run that is given twice, StoreError for a path that is not a run or does
-    not verify, and DataError for a bundle whose data are not found.
+    `data` are more folders with data. Raises SpecError for a run that is given twice, StoreError if
+    a path is not a run or does not verify, and DataError if a bundle's data are not found.
     """
     opened: list[SiteRun] = []
     seen: dict[tuple[str, str], str] = {}

@@ -46,37 +46,23 @@ _PICTURE_PX, _GAP_PX = 320, 8
 Phase = Literal["start", "warmed", "waiting", "question", "paused", "done", "closed"]
 
 
-@dataclass(frozen=True)
-class Person:
-    """A person who answers; `is_exact` shows models' prompt. Raises SpecError for a bad name."""
-
-    name: str
-    is_exact: bool = False
-
-    def __post_init__(self) -> None:
-        if not _NAME.fullmatch(self.name):
-            allowed = "1 to 40 letters a-z, A-Z, digits, - and _, with a letter or digit first"
-            raise SpecError(Problem("--name", "is not a valid name", "", self.name, allowed))
-
-    @property
-    def model(self) -> str:
-        """Their name in records and tables."""
-        return f"{HUMAN}{self.name}"
-
-
-def plan_session(suite: Suite, person: Person, limit: int | None) -> RunPlan:
+def plan_session(suite: Suite, name: str, limit: int | None, *, is_exact: bool = False) -> RunPlan:
     """Return the plan of one person's run: a suite asked once, with its first seed.
 
-    Raises as `make_plan`, and SpecError for `vary` or tracks that nobody can answer by hand.
+    With `is_exact` the page shows the exact prompt of models. Raises as `make_plan`, and SpecError
+    for a bad name, `vary`, or tracks that nobody can answer by hand.
     """
+    if not _NAME.fullmatch(name):
+        allowed = "1 to 40 letters a-z, A-Z, digits, - and _, with a letter or digit first"
+        raise SpecError(Problem("--name", "is not a valid name", "", name, allowed))
     if suite.vary.factors:
         message, hint = "varies its presentation, and a person is asked once", "remove `vary`"
         found = ", ".join(suite.vary.factors)
         raise SpecError(Problem(suite.where("vary"), message, "vary", found, hint=hint))
     once = suite.model_copy(update={"seeds": suite.seeds[:1]})
     # Another prompt makes another run.
-    params: dict[str, JsonValue] = {"exact": True} if person.is_exact else {}
-    planned = ModelConfig(name=person.model, extra_body=params, max_concurrency=1)
+    params: dict[str, JsonValue] = {"exact": True} if is_exact else {}
+    planned = ModelConfig(name=f"{HUMAN}{name}", extra_body=params, max_concurrency=1)
     return make_plan(once, {}, limit=limit, people=[planned])
 
 
@@ -201,27 +187,26 @@ class PlaySession:
         self._is_exact = False
         self._ending: Ending | None = None
 
-    async def run(
-        self, plan: RunPlan, person: Person, folder: Path, opened: Callable[[], None]
-    ) -> RunResult:
+    async def run(self, plan: RunPlan, folder: Path, opened: Callable[[], None]) -> RunResult:
         """Ask the remaining samples; a signal closes the session, and all answers are written.
 
         `opened` is called when the page can be shown. Raises the errors of the run.
         """
 
-        self._is_exact = person.is_exact
+        (person,) = (model for model in plan.models if model.kind == "human")
+        self._is_exact = "exact" in person.extra_body
 
         def watch(event: RunEvent) -> None:
             if isinstance(event, RunStarted):
-                self.done = len(event.earlier[person.model])
+                self.done = len(event.earlier[person.name])
                 if self.done < self._of:
-                    self.welcome(person.name)
+                    self.welcome(person.name.removeprefix(HUMAN))
                 opened()
-            elif isinstance(event, SampleDone) and event.sample.model == person.model:
+            elif isinstance(event, SampleDone) and event.sample.model == person.name:
                 self.done += event.sample.is_final
                 self._turns = 0
 
-        model, loop = PersonModel(person.model, plan, self), asyncio.get_running_loop()
+        model, loop = PersonModel(person.name, plan, self), asyncio.get_running_loop()
         signals = (signal.SIGINT, signal.SIGTERM)
         session = Session(plan, folder, watch, use_cache=False, present={model.name: model})
 

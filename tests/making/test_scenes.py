@@ -34,7 +34,8 @@ def test_whatever_is_put_down_neither_overlaps_nor_floats(drawn):
     draft = sketch.Draft(np.random.default_rng(0))
     for (block_type, pose), y, x in drawn:
         draft.put(block_type, y, x, pose)
-    assert find_overlaps(draft.blocks, 1e-5) == find_gaps(draft.blocks, 1e-5) == ()
+    assert not find_overlaps(draft.blocks, 1e-5)
+    assert not find_gaps(draft.blocks, 1e-5)
 
 
 palettes, levels = st.sampled_from(["kit", "full"]), st.sampled_from(sorted(GROUPS))
@@ -56,7 +57,8 @@ def test_what_the_grammar_draws_keeps_its_limits(request_):
         assert scene.levels == tuple(GROUPS[request_.group].levels)
         assert list(findings_of(SceneFacts(scene), FORM)) == []
         assert {block.kind for block in scene.blocks} <= {*sketch.PALETTES[request_.palette]}
-        assert find_overlaps(scene.blocks) == find_gaps(scene.blocks) == ()
+        assert not find_overlaps(scene.blocks)
+        assert not find_gaps(scene.blocks)
         assert len({block.look for block in scene.blocks}) <= 14
 
 

@@ -16,7 +16,7 @@ from phyblock.errors import SpecError
 from phyblock.models.request import HaltedError, Image, Message, Request
 from phyblock.tracks.base import Choice, Pick, Picking
 from phyblock.web.server import LARGEST_BODY_BYTES, Server
-from phyblock.web.session import NotNowError, Person, PlaySession, plan_session
+from phyblock.web.session import NotNowError, PlaySession, plan_session
 from tests.workspace import SCENES, in_a_loop, until
 
 PICTURE = Image(b"pixels", "candidates", 64, 64)
@@ -105,14 +105,13 @@ async def test_an_answer_counts_once_and_only_for_what_lies_there():
 
 def played(suite, picks):
     """Sit down, pick these one after another, and close the sitting; what was shown."""
-    person = Person("ada")
-    plan = plan_session(load_suite(suite), person, None)
+    plan = plan_session(load_suite(suite), "ada", None)
     session = PlaySession(plan.samples_per_model)
     shown = []
 
     async def sat():
         left = list(picks)
-        run = asyncio.create_task(session.run(plan, person, suite.parent / "out", lambda: None))
+        run = asyncio.create_task(session.run(plan, suite.parent / "out", lambda: None))
         while not run.done():
             await asyncio.sleep(0.01)
             told = session.state(-1)
