@@ -276,8 +276,7 @@ class Task:
         if not (reply is None or isinstance(reply, str)):
             allowed = "a text, None" + (", a list of texts" if self.plays else "")
             raise SpecError(Problem(self.id, "cannot be scored", "reply", repr(reply), allowed))
-        record = _result(judge_reply(self.track, self.item, self._begun(reply)))
-        return self._scored(record)
+        return self._scored(_result(judge_reply(self.track, self.item, self._begun(reply))))
 
     def episode(self) -> Episode:
         """Return a new episode. Raises SpecError for a track without episodes."""
@@ -361,8 +360,7 @@ class Episode:
         """Return the score of the episode so far."""
         fields = self.task._begun(None)
         track, item = self.task.track, self.task.item
-        record = judge_episode(track, item, fields, self._episode, self._replies)
-        return self.task._scored(record)
+        return self.task._scored(judge_episode(track, item, fields, self._episode, self._replies))
 
 
 @dataclass(frozen=True, repr=False)

@@ -113,8 +113,7 @@ def opened_bundle(path: Path, data: Sequence[Path] = ()) -> Iterator[Verified]:
         folder.mkdir()
         try:
             made_by = unpack(path, folder)
-            manifest = read_manifest(folder)
-            here = _localized(folder, manifest, data)
+            here = _localized(folder, read_manifest(folder), data)
             (folder / MANIFEST).write_text(dump_yaml(here.fields()), encoding="utf-8")
             judged, again = rescored(folder)
             counted = ("items", "scenes", "scenes_by_level")

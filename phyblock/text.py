@@ -70,8 +70,7 @@ def csv_cell(value: object) -> object:
 
 def hex_digest(content: bytes | str) -> str:
     """Return the SHA-256 of bytes, or of a text as UTF-8, in hexadecimal digits."""
-    data = content.encode() if isinstance(content, str) else content
-    return hashlib.sha256(data).hexdigest()
+    return hashlib.sha256(content.encode() if isinstance(content, str) else content).hexdigest()
 
 
 def drawn_bytes(*words: object) -> bytes:

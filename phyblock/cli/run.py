@@ -131,8 +131,7 @@ def run(
     if not is_as_it_was:
         Thread(target=import_module, args=("phyblock.results.tables",)).start()
     with ProgressView(console) as view:
-        session = Session(plan, folder, view, **asks)
-        result = completed(session, _SIGNALS, view.tick)
+        result = completed(Session(plan, folder, view, **asks), _SIGNALS, view.tick)
     gc.freeze()
     if result.left or not (is_as_it_was and _is_newest(folder, made)):
         show_tables(folder, page=not no_report)
@@ -149,8 +148,7 @@ def run(
 def _is_newest(folder: Path, made: Path) -> bool:
     """True if phyblock made the tables or page of a run folder after its last record."""
     ends = [path.stat().st_mtime_ns for path in (folder / RECORDS, made) if path.exists()]
-    is_own = bool(OutFolder(folder).names(made.name))
-    return is_own and len(ends) == 2 and ends[0] <= ends[1]
+    return bool(OutFolder(folder).names(made.name)) and len(ends) == 2 and ends[0] <= ends[1]
 
 
 def _conclude(console: Console, folder: Path, result: RunResult, view: ProgressView) -> int:

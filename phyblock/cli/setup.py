@@ -144,8 +144,7 @@ def models(models_file: str | None) -> None:
     ui.print_rows(console, ("model", "id", "key", "$/M in, out"), rows, numbers=1)
     console.print(f"{counted(len(known), 'model')} in {ui.shown_path(path)}")
     for group in dict.fromkeys(group for config in known.values() for group in config.groups):
-        members = ", ".join(with_members([GROUP + group], known))
-        console.print(f"{GROUP}{group}: {members}")
+        console.print(f"{GROUP}{group}: {', '.join(with_members([GROUP + group], known))}")
     console.print(f"Baselines, at no cost: {', '.join(baseline_names())}")
 
 

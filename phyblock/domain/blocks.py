@@ -396,13 +396,11 @@ def orientation_class(block_type: BlockType, euler_deg: Euler) -> tuple[float, .
 
     The least nine matrix entries (rounded to 1e-4) of all rotations that look like the given one.
     """
-    rotation = euler_deg_to_matrix(euler_deg)
-    equivalent = np.round(rotation @ symmetries(block_type), 4) + 0.0
+    equivalent = np.round(euler_deg_to_matrix(euler_deg) @ symmetries(block_type), 4) + 0.0
     return min(tuple(float(entry) for entry in matrix.ravel()) for matrix in equivalent)
 
 
 def turn_deg(block_type: BlockType, one: NDArray[np.float64], other: NDArray[np.float64]) -> float:
     """The least angle [degrees] between two rotations (3, 3) of a block, up to its symmetry."""
-    equivalent = one @ symmetries(block_type)
-    cosines = (np.einsum("kij,ij->k", equivalent, other) - 1) / 2
+    cosines = (np.einsum("kij,ij->k", one @ symmetries(block_type), other) - 1) / 2
     return math.degrees(math.acos(min(1.0, max(-1.0, float(cosines.max())))))

@@ -140,8 +140,7 @@ def rotated(question: Question, by: int) -> Question:
         marks = picture.marks
         if names_marks:
             marks = tuple(Mark(rotated_label(m.letter, by, n), m.position_m) for m in marks)
-        label = rotated_label(picture.label, by, n)
-        pictures.append(replace(picture, label=label, marks=marks))
+        pictures.append(replace(picture, label=rotated_label(picture.label, by, n), marks=marks))
     if not names_marks and not all(map(is_picture_option, options)):
         options = tuple(options[(i + by) % n] for i in range(n))
     answer = tuple((index - by) % n for index in question.answer)

@@ -351,8 +351,7 @@ def image_deg(euler_deg: Euler, symmetry: Symmetry) -> Euler:
 @functools.cache
 def pose_class(block_type: BlockType, euler_deg: Euler) -> tuple[float, ...]:
     """The orientation class; for an upright round block, whose facets hardly show, its axis."""
-    rotation = euler_deg_to_matrix(euler_deg)
-    if SHAPES[block_type].is_round and abs(rotation[2, 2]) > 1 - 1e-6:
+    if SHAPES[block_type].is_round and abs(euler_deg_to_matrix(euler_deg)[2, 2]) > 1 - 1e-6:
         return (0.0, 0.0, 1.0)
     return orientation_class(block_type, euler_deg)
 

@@ -26,15 +26,7 @@ from phyblock.domain.scene import Block
 from phyblock.errors import SimulationError
 from phyblock.sim.balance import FRICTIONS, MASS_FACTORS, prove_standing
 from phyblock.sim.contact import FIT_TOLERANCE_M, bounds_m, boxes_near, drop_height_m, piece_pairs
-from phyblock.sim.engine import (
-    GRAVITY_M_S2,
-    Physics,
-    PhysicsEngine,
-    Pose,
-    World,
-    open_world,
-    physics_engine,
-)
+from phyblock.sim.engine import Physics, PhysicsEngine, Pose, World, open_world, physics_engine
 from phyblock.sim.geometry import rounded, significant
 from phyblock.types import StepEnd
 
@@ -458,9 +450,9 @@ _LONGEST_S = 5.0
 
 def _leaning(physics: Physics, downhill: tuple[float, float]) -> Physics:
     """The same settings on a floor that is tilted by `LEAN_DEG` towards a unit vector (x, y)."""
-    slope = math.radians(LEAN_DEG)
-    x, y = (part * math.sin(slope) * GRAVITY_M_S2 for part in downhill)
-    return replace(physics, gravity_m_s2=(x, y, -math.cos(slope) * GRAVITY_M_S2))
+    slope, gravity_m_s2 = math.radians(LEAN_DEG), -physics.gravity_m_s2[2]
+    x, y = (part * math.sin(slope) * gravity_m_s2 for part in downhill)
+    return replace(physics, gravity_m_s2=(x, y, -math.cos(slope) * gravity_m_s2))
 
 
 _ACROSS = math.sqrt(0.75)

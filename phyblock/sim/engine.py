@@ -205,8 +205,7 @@ def installed_engines() -> tuple[str, ...]:
 
 def physics_engine() -> PhysicsEngine:
     """Return the engine of `PHYBLOCK_PHYSICS`, or the default. Raises InputError if missing."""
-    usual = next(iter(installed_engines()), REFERENCE_ENGINE)
-    name = os.environ.get(PHYSICS_VARIABLE, usual)
+    name = os.environ.get(PHYSICS_VARIABLE, next(iter(installed_engines()), REFERENCE_ENGINE))
     if name not in ENGINES:
         allowed = ", ".join(ENGINES)
         raise InputError(Problem(PHYSICS_VARIABLE, "is not known", found=name, allowed=allowed))

@@ -161,8 +161,7 @@ def _mesh(shape: Shape, profile: Profile) -> Mesh:
 
 def _cap(shape: Shape, outline: Vectors, along_m: float) -> Vectors:
     """The outline (n, 2) in the body frame at a place along the axis, shape (n, 3) [m]."""
-    column = 0 if shape.axis == "x" else 2
-    return np.insert(outline, column, along_m, axis=1)
+    return np.insert(outline, 0 if shape.axis == "x" else 2, along_m, axis=1)
 
 
 def corners_m(
@@ -222,8 +221,7 @@ def center_cm(block: Block) -> tuple[float, float, float]:
 
 def box_height_cm(block: Block) -> float:
     """The height of the box around a block in its orientation [cm]."""
-    heights = corners_m(block.type, (0.0, 0.0, 0.0), block.euler_deg)[:, 2]
-    return float(np.ptp(heights)) * _CM
+    return float(np.ptp(corners_m(block.type, (0.0, 0.0, 0.0), block.euler_deg)[:, 2])) * _CM
 
 
 def origin_m(

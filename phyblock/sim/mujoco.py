@@ -121,8 +121,7 @@ def _model(types: tuple[BlockType, ...], physics: Physics) -> Any:
         "condim": 3,
         "solref": [_CONTACT_STEPS * option.timestep, 1.0],
     }
-    plane = mujoco.mjtGeom.mjGEOM_PLANE
-    spec.worldbody.add_geom(type=plane, size=[1.0, 1.0, 1.0], **surface)
+    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[1.0, 1.0, 1.0], **surface)
     for block_type in dict.fromkeys(types):
         if not SHAPES[block_type].is_box:
             for number, piece in enumerate(collision_pieces(block_type, _INSET_M)):

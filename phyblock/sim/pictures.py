@@ -200,8 +200,7 @@ class PictureStyle:
             if not (least <= number <= most and math.isfinite(number)):
                 raise ValueError(f"{name} is {number!r}, allowed {least}..{most}")
         if self.background not in BACKGROUNDS:
-            allowed = ", ".join(BACKGROUNDS)
-            raise ValueError(f"background is {self.background!r}, allowed {allowed}")
+            raise ValueError(f"background is {self.background!r}, allowed {', '.join(BACKGROUNDS)}")
 
     @classmethod
     def from_view(
@@ -289,8 +288,7 @@ def goal_style(scene: Scene, style: PictureStyle) -> PictureStyle:
     places = np.array([block.position_m for block in scene.blocks])
     farthest_m = float(dot(places - camera.eye_m, camera.axes[2]).max())
     growth = _LEAST_CUBE * camera.width_m(farthest_m) / _CUBE_M
-    size_px = min(math.ceil(style.size_px * max(growth, 1.0)), LARGEST_PX)
-    return replace(style, size_px=size_px)
+    return replace(style, size_px=min(math.ceil(style.size_px * max(growth, 1.0)), LARGEST_PX))
 
 
 def camera_for(
@@ -359,8 +357,7 @@ def thumbnail(
     block: Block, style: PictureStyle, cell_px: int, distance_m: float | None
 ) -> Image.Image:
     """One cell of the candidate grid, without its number; shared: do not draw on it."""
-    camera = candidate_camera(block, style, distance_m)
-    return picture([block], camera, style.background, cell_px)
+    return picture([block], candidate_camera(block, style, distance_m), style.background, cell_px)
 
 
 def candidate_camera(block: Block, style: PictureStyle, distance_m: float | None = None) -> Camera:
@@ -600,8 +597,7 @@ def kit_sheet(candidates: CandidateSet, style: PictureStyle) -> Image.Image:
         sides = zip("xyz", (high - low).tolist(), strict=True)
         sizes = (f"{name} {round(side_cm, 1):g}" for name, side_cm in sides)
         left, foot = column * side + _MARGIN * side, row * side + side * (1 - _MARGIN)
-        ink = GROUNDS[style.background].ink
-        draw.text((left, foot), ", ".join(sizes), ink, font, anchor="ls")
+        draw.text((left, foot), ", ".join(sizes), GROUNDS[style.background].ink, font, anchor="ls")
         camera, middle = candidate_camera(block, style, distance_m), ((low + high) / 2 / _CM)[None]
         x, y = camera.to_pixels(middle, round(side))[0].tolist()
         x, y = column * side + x, row * side + y

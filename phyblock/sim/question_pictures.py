@@ -141,8 +141,7 @@ def _with_marks(image: Image.Image, marks: Sequence[Mark], camera: Camera) -> Im
         low = draw.textbbox((0, 0), mark.letter, font=font)
         left, top = x - (low[0] + low[2]) / 2, y - (low[1] + low[3]) / 2
         draw.text((left, top), mark.letter, fill=_DARK, font=font)
-    small = layer.reduce(_SUPERSAMPLE)
-    return Image.alpha_composite(image.convert("RGBA"), small).convert("RGB")
+    return Image.alpha_composite(image.convert("RGBA"), layer.reduce(_SUPERSAMPLE)).convert("RGB")
 
 
 def _label_places(centers: Sequence[Point], radius: float, size_px: int) -> list[Point]:

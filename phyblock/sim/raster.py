@@ -261,8 +261,7 @@ class _CameraScreen:
         """Triangles (n, 3, 3) [m] cut at the least depth, on screen (k, 3, 2), and their owners."""
         seen = turned(corners_m - self.camera.eye_m, self.camera.axes)
         whole = (seen[..., 2] >= _LEAST_DEPTH_M).all(axis=1)
-        owner = np.flatnonzero(whole)
-        kept, owners = [seen[whole]], [owner]
+        kept, owners = [seen[whole]], [np.flatnonzero(whole)]
         for number in np.flatnonzero(~whole & (seen[..., 2] >= _LEAST_DEPTH_M).any(axis=1)):
             kept.append(parts := _cut(seen[number]))
             owners.append(np.full(len(parts), number))

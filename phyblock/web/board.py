@@ -154,8 +154,7 @@ def values_of(run: Run, track: str) -> TrackValues:
     rows = rows[(rows["cell"] == run.cells(track)[-1].name) & rows["value"].notna()]
     rows = rows[rows["measure"].str.startswith("wrong_")]
     for model, name, value in zip(rows["model"], rows["measure"], rows["value"], strict=True):
-        share = round(100 * float(value), 2)
-        errors.setdefault(model, {})[name.removeprefix("wrong_")] = share
+        errors.setdefault(model, {})[name.removeprefix("wrong_")] = round(100 * float(value), 2)
     table, best, facts = coverage_frame(run), what.measure.best, {}
     for row in table[table["track"] == track].to_dict("records"):
         model = str(row["model"])

@@ -409,6 +409,5 @@ def write_page(
         with out.making(own) as new:
             facts = make(new)
         (path,) = out.write({name: template.render(**facts, **about, folder=own.rstrip("/"))})
-        kept = (own, *lasting)
-        out.remove(one for one in out.names(below) if not one.startswith(kept))
+        out.remove(one for one in out.names(below) if not one.startswith((own, *lasting)))
     return path
