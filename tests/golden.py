@@ -61,17 +61,15 @@ _LIMITS = {"questions": 16, "questions-json": 16}
 
 
 def rows_digests(path: Path) -> dict[str, str]:
-    """Return a digest of the rows of each model, of estimates each model and measure, in a table.
-
-    The order of rows changes nothing.
+    """Return a digest of the rows of each model, of estimates each model and measure, in a table,
+    in any order.
     """
-    rows = csv_rows(path)
-    columns = KEY_COLUMNS if path.name == "estimates.csv" else tuple(rows[0] if rows else ())
     by_model: defaultdict[str, list[str]] = defaultdict(list)
-    for row in rows:
-        model = row.get("model") or ""
-        key = f"{model} {row['measure']}" if path.name == "estimates.csv" else model
-        by_model[key].append(json.dumps([row[column] for column in columns]))
+    for row in csv_rows(path):
+        key, told = row.get("model") or "", [*row.values()]
+        if path.name == "estimates.csv":
+            key, told = f"{key} {row['measure']}", [row[column] for column in KEY_COLUMNS]
+        by_model[key].append(json.dumps(told))
     return {model: _digest(sorted(lines)) for model, lines in by_model.items()}
 
 

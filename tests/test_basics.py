@@ -10,7 +10,6 @@ import subprocess
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 from functools import partial
 from types import SimpleNamespace
 
@@ -18,7 +17,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from phyblock.domain.scene import Block
 from phyblock.errors import ModelError, PhyblockError, StoreError
 from phyblock.making.questions.guesses import text_features
 from phyblock.scoring.pose import PoseFit, overlap_volume
@@ -26,6 +24,7 @@ from phyblock.text import csv_cell, one_line, plain_sum
 from phyblock.tracks.pose_planning import FITS
 from phyblock.workers import Shards, open_workers
 from tests.shipped import built_in_questions
+from tests.sim.structures import block
 
 STARTS = tuple("=+-@\t\r\n")
 risky = st.text(alphabet="'=+-@\t\r\n1.a") | st.text()
@@ -90,17 +89,15 @@ def texts():
 
 def solids():
     """The overlap of two arches, which are three pieces each or more."""
-    arch = Block(1, "arch", "red", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (), 1)
-    moved = replace(arch, position_m=(0.003, 0.003, 0.003))
     turns = ((7.0 * n, 11.0 * n, 13.0 * n) for n in range(5))
-    return [overlap_volume(arch, replace(moved, euler_deg=turn)) for turn in turns]
+    moved = (block(1, "arch", (0.003, 0.003, 0.003), turn) for turn in turns)
+    return [overlap_volume(block(1, "arch", (0.0, 0.0, 0.0)), one) for one in moved]
 
 
 def fits():
     """Counts of how steps lie to goal blocks, as records hold them."""
     off = [PoseFit(n, 0.1 * n, 0.0, 0.0, 0.7 * n, 1 / (n + 1)) for n in range(30)]
-    records = [SimpleNamespace(pose=SimpleNamespace(steps=off[:n])) for n in range(30)]
-    return [list(FITS.of(record)) for record in records]
+    return [list(FITS.of(SimpleNamespace(pose=SimpleNamespace(steps=off[:n])))) for n in range(30)]
 
 
 @pytest.mark.parametrize("compute", [texts, solids, fits])
@@ -166,13 +163,12 @@ def test_shards_end_alike_at_once_or_one_after_another_and_go_on(tmp_path, at_on
 
 
 def test_a_shard_computes_what_a_killed_one_has_begun(tmp_path):
-    marks = tmp_path / "marks"
-    marks.mkdir()
     first, second = (Shards(tmp_path / "shards", number, 2, "work") for number in (1, 2))
+    work = partial(killed_once, tmp_path / "mark")
     with pytest.raises(PhyblockError), open_workers(2, shards=first) as workers:
-        list(workers.map(partial(killed_once, marks), range(40)))
+        list(workers.map(work, range(40)))
     with open_workers(shards=second) as workers:
-        assert list(workers.map(partial(killed_once, marks), range(40))) == list(range(40))
+        assert list(workers.map(work, range(40))) == list(range(40))
 
 
 def test_a_batch_that_could_not_be_started_can_be_computed_by_another_shard(tmp_path):
@@ -192,14 +188,15 @@ def test_a_batch_that_could_not_be_started_can_be_computed_by_another_shard(tmp_
 def test_a_killed_worker_of_a_cluster_loses_and_doubles_nothing(tmp_path):
     pytest.importorskip("ray", reason="Ray is not installed: pip install 'phyblock[ray]'")
     with open_workers(2, "local") as workers:
-        assert list(workers.map(partial(killed_once, tmp_path), range(40))) == list(range(40))
+        work = partial(killed_once, tmp_path / "mark")
+        assert list(workers.map(work, range(40))) == list(range(40))
         assert list(workers.map(late, range(150))) == SQUARES
 
 
-def killed_once(marks, number):
+def killed_once(mark, number):
     """Return the number, but kill the process of the first call with 37."""
-    if number == 37 and not list(marks.iterdir()):
-        (marks / "37").touch()
+    if number == 37 and not mark.exists():
+        mark.touch()
         os.kill(os.getpid(), signal.SIGKILL)
     return number
 
@@ -208,8 +205,8 @@ def killed_once(marks, number):
 def test_workers_end_with_the_process_that_started_them(sent, tmp_path):
     (tmp_path / "work.py").write_text(WORK, encoding="utf-8")
     words = [sys.executable, str(tmp_path / "work.py")]
-    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "start_new_session": True}
-    with subprocess.Popen(words, **pipes) as process:
+    pipes = dict.fromkeys(("stdout", "stderr"), subprocess.PIPE)
+    with subprocess.Popen(words, start_new_session=True, **pipes) as process:
         assert int(process.stdout.readline()) != int(process.stdout.readline())
         # Ctrl-C reaches the whole group, a kill one process alone.
         (os.killpg if sent == signal.SIGINT else os.kill)(process.pid, sent)

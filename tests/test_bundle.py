@@ -17,7 +17,8 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from phyblock.bundle import ABOUT, MEMBERS, add, bundle_run, opened_bundle, portable, unpack
+from phyblock import bundle
+from phyblock.bundle import ABOUT, MEMBERS, bundle_run, opened_bundle, unpack
 from phyblock.errors import DataError, StoreError
 from phyblock.records.files import MANIFEST, RECORDS, Manifest, known_records
 from phyblock.run.manifest import portable_manifest
@@ -27,16 +28,14 @@ from tests.servers.openai_chat import OpenAIChat
 from tests.web.factory import manifest, record
 from tests.workspace import SCENES, Workspace, questions, write_questions
 
-SUBTASKS = ["SH", "OR"]
-
 
 @pytest.fixture(scope="module")
 def made(new_workspace):
     """A model and a baseline in three tracks, and the bundle of the run beside it."""
-    workspace = new_workspace(*SCENES[:3])
-    write_questions(workspace.root / "questions", questions(per_subtask=2, subtasks=SUBTASKS))
+    workspace, subtasks = new_workspace(*SCENES[:3]), ["SH", "OR"]
+    write_questions(workspace.root / "questions", questions(per_subtask=2, subtasks=subtasks))
     tracks = {"tracks": ["full_planning", "vqa", "step_planning"], "steps": {"physics": "off"}}
-    tracks["vqa"] = {"path": "./questions", "subtasks": SUBTASKS}
+    tracks["vqa"] = {"path": "./questions", "subtasks": subtasks}
     with workspace.served(OpenAIChat(), models=["random", "alpha"], **tracks):
         workspace.completed()
     workspace.does("bundle", "out")
@@ -198,29 +197,12 @@ LESS = [(name, data) for name, data in SOUND.items() if name != RECORDS]
 _FILE = io.BytesIO()
 with zipfile.ZipFile(_FILE, "w") as _made:
     for _name in MEMBERS:
-        add(_made, _name, [SOUND[_name].decode()])
+        bundle.add(_made, _name, [SOUND[_name].decode()])
 PACKED = _FILE.getvalue()
-
-
-def linked():
-    info = zipfile.ZipInfo(RECORDS)
-    info.external_attr = (stat.S_IFLNK | 0o777) << 16
-    return archive(*LESS, (info, b"/etc/passwd"))
-
-
-def smaller_than_it_is():
-    """The list of members says that one holds less than it does."""
-    size = struct.pack("<L", len(SOUND[RECORDS]))
-    assert size in PACKED
-    return PACKED.replace(size, struct.pack("<L", 7))
-
-
-def encrypted():
-    data = bytearray(PACKED)
-    data[data.index(b"PK\1\2") + 8] |= 1
-    return bytes(data)
-
-
+FLAGS_AT = PACKED.index(b"PK\1\2") + 8
+SIZE = struct.pack("<L", len(SOUND[RECORDS]))
+LINK = zipfile.ZipInfo(RECORDS)
+LINK.external_attr = (stat.S_IFLNK | 0o777) << 16
 HOSTILE = {
     "empty": lambda: b"",
     "text": lambda: b"hello\n" * 100,
@@ -228,10 +210,10 @@ HOSTILE = {
     "absolute": lambda: archive(*LESS, ("/tmp/evil", b"x")),
     "folder": lambda: archive(*LESS, (f"{RECORDS}/", b"")),
     "twice": lambda: archive(*SOUND.items(), (RECORDS, b"x")),
-    "link": linked,
+    "link": lambda: archive(*LESS, (LINK, b"/etc/passwd")),
     "bomb": lambda: archive(*LESS[:1], (RECORDS, b"x"), (ABOUT, bytes(2**24))),
-    "larger than it says": smaller_than_it_is,
-    "encrypted": encrypted,
+    "larger than it says": lambda: PACKED.replace(SIZE, struct.pack("<L", 7)),
+    "encrypted": lambda: PACKED[:FLAGS_AT] + b"\1" + PACKED[FLAGS_AT + 1 :],
     "lacks one": lambda: archive(*LESS),
     "changed": lambda: archive(*LESS, (RECORDS, b"other")),
     "no digests": lambda: archive(*LESS[:1], (RECORDS, b"other"), (ABOUT, b"[]")),
@@ -247,6 +229,7 @@ def test_a_hostile_archive_is_refused_and_writes_nothing_elsewhere(tmp_path, kin
     path, folder = tmp_path / "b.zip", tmp_path / "a" / "b" / "c"
     folder.mkdir(parents=True)
     path.write_bytes(HOSTILE[kind]())
+    assert path.read_bytes() != PACKED
     with pytest.raises(StoreError, match=re.escape(str(path))):
         unpack(path, folder)
     written = {p.relative_to(tmp_path).as_posix() for p in tmp_path.rglob("*") if p.is_file()}
@@ -286,16 +269,16 @@ def test_of_what_one_machine_knows_the_ends_of_paths_stay(before, after):
     params = {"stop": ["/no_think", "/a/b"], "extra_body": {"path": "/v1/x"}}
     fields = manifest(models=["alpha"])
     served = {"kind": "litellm", "served_at": ["http://10.0.0.5:8000/v1"], "id": before}
-    fields["models"] = [{**fields["models"][0], **served, "params": params}]
+    fields["models"][0] |= served | {"params": params}
     found = portable_manifest(one := Manifest.model_validate(fields))
-    assert (found.models[0].fields()["id"], found.identity) == (after, one.identity)
-    assert found.models[0].fields()["params"] == params
-    assert not found.models[0].served_at
+    (model,) = found.models
+    assert (model.id, model.fields()["params"], model.served_at) == (after, params, ())
+    assert found.identity == one.identity
     line = record(outcome="api_error")
     line["error"] |= {"message": "POST http://10.0.0.5:8000/v1/chat: open '/scratch/bob/keys.txt'"}
-    failed = portable(known_records().validate_python(line))
+    failed = bundle.portable(known_records().validate_python(line))
     assert json.loads(failed.as_json()) == {**line, "error": {**line["error"], "message": ""}}
-    named = portable(known_records().validate_python(record(provider_model=before)))
+    named = bundle.portable(known_records().validate_python(record(provider_model=before)))
     assert named.reply.provider_model == after
 
 

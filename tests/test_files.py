@@ -11,17 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import PngImagePlugin
 
+from phyblock import files
 from phyblock.errors import DataError, StoreError
-from phyblock.files import (
-    LIST,
-    OutFolder,
-    atomic_write,
-    load_json,
-    open_picture,
-    read_bytes,
-    read_picture,
-    write_named,
-)
+from phyblock.files import LIST, OutFolder, open_picture, read_bytes, read_picture
+from tests.config.test_yaml import TEXT, values
 from tests.fuzz.strategies import PICTURES, chunk, encoded, png_header
 from tests.workspace import problem_of
 
@@ -31,7 +24,7 @@ def test_what_is_written_is_read(tmp_path_factory, data):
     folder = tmp_path_factory.mktemp("files")
     path = folder / "file"
     path.write_text("before")
-    atomic_write(path, data)
+    files.atomic_write(path, data)
     assert path.read_bytes() == (data if isinstance(data, bytes) else data.encode())
     assert list(folder.iterdir()) == [path]
 
@@ -39,48 +32,31 @@ def test_what_is_written_is_read(tmp_path_factory, data):
 def test_what_cannot_be_replaced_stays_and_nothing_is_left_beside_it(tmp_path):
     (tmp_path / "folder" / "inside").mkdir(parents=True)
     with pytest.raises(OSError, match="folder"):
-        atomic_write(tmp_path / "folder", b"data")
+        files.atomic_write(tmp_path / "folder", b"data")
     assert list(tmp_path.iterdir()) == [tmp_path / "folder"]
 
 
 def test_a_named_file_replaces_one_of_its_kind_and_nothing_else(tmp_path):
     (tmp_path / "link").symlink_to(tmp_path / "target")
-    for name, before in {
-        "link": None,
-        "deep/new": None,
-        "empty": b"",
-        "gif": b"GIF89a old",
-    }.items():
-        path = tmp_path / name
-        if before is not None:
-            path.write_bytes(before)
-        write_named(path, iter([b"GIF89a", b" new"]))
-        assert path.read_bytes() == b"GIF89a new"
+    (tmp_path / "empty").touch()
+    (tmp_path / "gif").write_bytes(b"GIF89a old")
+    for name in ("link", "deep/new", "empty", "gif"):
+        files.write_named(tmp_path / name, iter([b"GIF89a", b" new"]))
+        assert (tmp_path / name).read_bytes() == b"GIF89a new"
     assert (tmp_path / "link").is_symlink()
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "notes").write_bytes(b"GI")
     before = sorted(tmp_path.rglob("*"))
     for path in (tmp_path / "pipe", tmp_path, tmp_path / "notes"):
         with pytest.raises(StoreError, match="of another kind"):
-            write_named(path, b"GIF89a new")
+            files.write_named(path, b"GIF89a new")
     assert sorted(tmp_path.rglob("*")) == before
     assert ((tmp_path / "pipe").is_fifo(), (tmp_path / "notes").read_bytes()) == (True, b"GI")
 
 
-_VALUES = st.recursive(
-    st.none()
-    | st.booleans()
-    | st.integers()
-    | st.floats(allow_nan=False, allow_infinity=False)
-    | st.text(st.characters(exclude_categories=("Cs",))),
-    lambda below: st.lists(below) | st.dictionaries(st.text(), below),
-)
-
-
-@given(_VALUES)
+@given(values(TEXT))
 def test_json_of_ordinary_size_is_read_as_json_reads_it(value):
-    text = json.dumps(value)
-    assert load_json(text) == json.loads(text)
+    assert files.load_json(json.dumps(value)) == value
 
 
 @pytest.mark.parametrize(
@@ -99,7 +75,7 @@ def test_json_of_ordinary_size_is_read_as_json_reads_it(value):
 )
 def test_json_beyond_the_bounds_is_a_value_error(text, message):
     with pytest.raises(ValueError, match=message):
-        load_json(text)
+        files.load_json(text)
 
 
 def test_only_files_are_read_and_up_to_the_limit(tmp_path):
@@ -137,8 +113,8 @@ BAD = {
     "bomb": (png_header(30_000, 30_000), "900000000 pixels"),
     "warned": (png_header(10_000, 10_000), "10,000 x 10,000 pixels"),
     "no-size": (png_header(0, 0), "pic.png"),
-    "cut-png": (GOOD["PNG"][:-40], "is not a readable picture: "),
-    "cut-jpeg": (GOOD["JPEG"][: len(GOOD["JPEG"]) // 2], "is not a readable picture: "),
+    "cut-png": (GOOD["PNG"][:-40], UNREADABLE),
+    "cut-jpeg": (GOOD["JPEG"][: len(GOOD["JPEG"]) // 2], UNREADABLE),
     "cut-webp": (GOOD["WEBP"][: len(GOOD["WEBP"]) // 2], "pic.png"),
     "empty-data": (png_header(64, 64), "is not a readable picture: "),
     "text-bomb": (with_chunk(GOOD["PNG"], b"zTXt", b"a\0\0" + BOMB), "is not a readable picture: "),
@@ -216,10 +192,8 @@ def test_links_are_neither_followed_nor_replaced(tmp_path):
     (out / "tables").symlink_to(tmp_path / "elsewhere", target_is_directory=True)
     with pytest.raises(StoreError) as caught:
         OutFolder(out).write({"tables/file": "ours", "tables/deep/x": "ours", "c.csv": "ours"})
-    assert [problem.where for problem in caught.value.problems] == [
-        str(out / "tables"),
-        str(out / "c.csv"),
-    ]
+    where = [problem.where for problem in caught.value.problems]
+    assert where == [str(out / "tables"), str(out / "c.csv")]
     (out / LIST).unlink()
     (out / LIST).symlink_to(tmp_path / "elsewhere" / "file")
     for name, said in {"a": "it is a link", "../mine": "leads out", "/mine": "leads out"}.items():

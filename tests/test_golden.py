@@ -8,15 +8,11 @@ from tests import golden
 from tests.conftest import OFFICIAL_MISSING, official_root
 
 GOLDEN = json.loads(golden.GOLDEN.read_text(encoding="utf-8"))
-
-
 # A part of the longest runs is made each time.
-WHOLE = ("quick", "pose")
+SLOW = {name: pytest.param(name, marks=pytest.mark.slow) for name in ("quick", "pose")}
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=pytest.mark.slow if n in WHOLE else ()) for n in golden.RUNS]
-)
+@pytest.mark.parametrize("name", [SLOW.get(name, name) for name in golden.RUNS])
 def test_numbers_are_what_they_were(name, tmp_path, pictures_dir):
     if name == "paper-table1" and official_root() is None:
         pytest.skip(OFFICIAL_MISSING)

@@ -105,10 +105,8 @@ def test_what_is_wrong_is_named():
 def test_nothing_is_spent_unasked_and_a_loop_may_run(workspace, monkeypatch):
     monkeypatch.chdir(workspace.root)
     monkeypatch.setenv("OPENAI_API_KEY", "sk-nobody")
-    (workspace.root / "billed.yaml").write_text(
-        "paid: {id: openai/gpt-4o, api_base: 'http://127.0.0.1:9/v1', "
-        "price: {input: 1, output: 1}}\n"
-    )
+    paid = {"id": "openai/gpt-4o", "api_base": "http://127.0.0.1:9/v1"}
+    workspace.write_yaml("billed.yaml", {"paid": paid | {"price": {"input": 1, "output": 1}}})
     out = workspace.root / "paid"
     with pytest.raises(SpecError, match=r"was not confirmed(.|\n)*yes=True"):
         phyblock.run_suite("quick", models=["paid"], limit=1, out=out, models_file="billed.yaml")
@@ -156,11 +154,9 @@ def test_a_task_asks_as_a_run_does(track):
     with contextlib.closing(Workshop()) as shop:
         for task in found:
             opened = type(task.track)(found.suite, task.track.dataset, 2, shop)
-            if task.plays:
-                asked = opened.start(task.item, 0, {}, with_messages=True).request()
-            else:
-                asked = opened.request(task.item, 0, {}, with_messages=True)
-            request = asyncio.run(asked)
+            ask = opened.start if task.plays else opened.request
+            asked = ask(task.item, 0, {}, with_messages=True)
+            request = asyncio.run(asked.request() if task.plays else asked)
             assert task.request().messages == request.messages
             assert task.messages()[-1]["role"] == "user"
             assert len(task.pictures) == str(task.messages()).count("data:image/png;base64,")
@@ -201,15 +197,13 @@ def test_threads_and_processes_share_nothing():
 
 def test_streams_hold_no_scene_of_the_test_set_and_begin_anywhere():
     stream = phyblock.tasks("full_planning", split="train", levels=[1, 2], seed=5)
-    first = list(itertools.islice(stream, 3))
-    again = list(itertools.islice(stream, 3))
+    first, again = (list(itertools.islice(stream, 3)) for _ in range(2))
     assert [one.key for one in first] == [one.key for one in again]
     later = phyblock.tasks("full_planning", split="train", levels=[1, 2], seed=5, first=2)
     assert next(iter(later)).key == first[2].key
     assert not {one.key for one in first} & {one.key for one in phyblock.tasks("full_planning")}
-    dev = phyblock.tasks("pose_planning", split="dev", levels=[1], seed=5, limit=1)
-    assert len(dev) == 1
-    assert not phyblock.verify(dev[0].item)
+    (dev,) = phyblock.tasks("pose_planning", split="dev", levels=[1], seed=5, limit=1)
+    assert not phyblock.verify(dev.item)
     assert first[0].score(None).outcome == "missing"
     with pytest.raises(TypeError, match="give a limit"):
         len(stream)
@@ -221,8 +215,8 @@ def test_finite_sets_hold_each_scene_once_and_have_slices():
     assert drawn[2] == drawn[0], "the scene comes again"
     assert stream[1].key == drawn[1]
     finite = phyblock.tasks("full_planning", split="train", levels=[1], seed=1, limit=3)
-    assert [one.key for one in finite][:2] == drawn[:2]
-    assert len(finite) == 3
-    assert [one.key for one in finite[1:]] == [finite[1].key, finite[2].key]
+    keys = [one.key for one in finite]
+    assert (keys[:2], len(keys), len(finite)) == (drawn[:2], 3, 3)
+    assert [one.key for one in finite[1:]] == keys[1:]
     with pytest.raises(SpecError, match="give 1 scenes"):
         _distinct(itertools.repeat(finite[0].track.dataset.tasks[0]), 2)

@@ -77,8 +77,7 @@ def test_no_cell_of_any_csv_is_a_formula(tmp_path):
         record(FORMULA, scene, scores=[score(1, 1, 1)], text="-2+3+cmd|' /C calc'!A0")
         for scene in LEVELS
     ]
-    facts = manifest(models=[FORMULA], seeds=[0])
-    facts["suite"]["models"] = ["alpha"]
+    facts = manifest(models=[FORMULA], seeds=[0], suite={"models": ["alpha"]})
     folder = write_run(tmp_path / "run", records, facts)
     written = write_tables(folder)
     exported = write_csv(load_run(folder), folder / "export")

@@ -1,17 +1,16 @@
 """What the documentation says is done: tutorials from an empty folder, plugins, models."""
 
-import base64
 import os
 import re
 import subprocess
 import sys
-import zlib
 from pathlib import Path
 
 import pytest
 
 from tests.servers.chassis import Running
 from tests.servers.openai_chat import OpenAIChat
+from tests.web.test_data import unpacked
 from tests.workspace import csv_rows
 
 DOCS = Path(__file__).parents[2] / "docs"
@@ -26,13 +25,13 @@ def follow(text, workspace, url=ADDRESS):
     Blocks with a title are files, added to those that are there; `sh` blocks are commands. Others,
     such as `console`, need what a test does not have.
     """
-    command = workspace.root / "bin" / "phyblock"
-    command.parent.mkdir()
-    command.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m phyblock "$@"\n')
-    command.chmod(0o755)
+    program = workspace.root / "bin" / "phyblock"
+    program.parent.mkdir()
+    program.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m phyblock "$@"\n')
+    program.chmod(0o755)
     folder = workspace.root / "reader"
     folder.mkdir()
-    env = {**workspace.env, "PATH": f"{command.parent}{os.pathsep}{workspace.env['PATH']}"}
+    env = {**workspace.env, "PATH": f"{program.parent}{os.pathsep}{workspace.env['PATH']}"}
     printed = ""
     for language, file, block in _FENCE.findall(text):
         step = block.replace(ADDRESS, url)
@@ -40,15 +39,9 @@ def follow(text, workspace, url=ADDRESS):
             with (folder / file).open("a", encoding="utf-8") as written:
                 written.write(step)
         elif language == "sh":
-            done = subprocess.run(
-                ["bash", "-euc", f"{step}\npwd >{workspace.root}/where"],
-                cwd=folder,
-                env=env,
-                stdin=subprocess.DEVNULL,
-                capture_output=True,
-                text=True,
-                timeout=300,
-            )
+            command = ["bash", "-euc", f"{step}\npwd >{workspace.root}/where"]
+            caught = {"stdin": subprocess.DEVNULL, "capture_output": True, "text": True}
+            done = subprocess.run(command, cwd=folder, env=env, timeout=300, **caught)
             assert done.returncode == 0, f"{step}\n{done.stdout}\n{done.stderr}"
             folder = Path((workspace.root / "where").read_text().strip())
             printed += done.stdout
@@ -82,17 +75,11 @@ MOST_LINES = 150
 EXTENDING = (DOCS / "extending.md").read_text(encoding="utf-8")
 SECTIONS = dict(re.findall(r"^## (.+?)\n(.*?)(?=^## |\Z)", EXTENDING, re.M | re.S))
 SHOWN = {
-    "A block shape": ("towers", "f1", {"oracle": 1.0, "random": None}, "table1.tex", "hexagon"),
-    "A background": ("grounds", "f1", {"random": None}, "sensitivity.tex", "sand"),
-    "A question kind": ("ground", "accuracy", {"oracle": 1.0}, "table2.tex", "GR"),
-    "A measure": (
-        "needless",
-        "needless",
-        {"oracle": 0.0},
-        "full_planning_measures.tex",
-        "Needless",
-    ),
-    "A track": ("counting", "exact", {"oracle": 1.0, "random": None}, "counting.tex", "Counting"),
+    "A block shape": ("towers", "f1", {"oracle": 1.0, "random": None}, "table1", "hexagon"),
+    "A background": ("grounds", "f1", {"random": None}, "sensitivity", "sand"),
+    "A question kind": ("ground", "accuracy", {"oracle": 1.0}, "table2", "GR"),
+    "A measure": ("needless", "needless", {"oracle": 0.0}, "full_planning_measures", "Needless"),
+    "A track": ("counting", "exact", {"oracle": 1.0, "random": None}, "counting", "Counting"),
 }
 """By section: the folder of its run, a measure with values, a table, and a text of the page."""
 
@@ -112,15 +99,9 @@ def test_a_plugin_is_in_tables_and_on_the_page(section, workspace):
         (found, *_) = [row for row in rows if row["model"] == model]
         assert found["lo"] <= found["value"] <= found["hi"]
         assert value is None or float(found["value"]) == value
-    shown = (run / "tables" / table).read_text(encoding="utf-8")
+    shown = (run / "tables" / f"{table}.tex").read_text(encoding="utf-8")
     assert all(model in shown for model in values)
     assert word in shown or section in ("A block shape", "A background")
-    assert word in page_of(run)
-
-
-def page_of(run):
-    """Return the report with the data that it loads, unpacked."""
-    scripts = "".join(file.read_text(encoding="utf-8") for file in (run / "report").rglob("*.js"))
-    packed = re.findall(r"^phyblockTake\('[^']*','[^']*','([^']*)'\)$", scripts, re.M)
-    data = [zlib.decompress(base64.b64decode(text)).decode() for text in packed]
-    return "".join([(run / "report.html").read_text(encoding="utf-8"), *data])
+    scripts = [path for path in (run / "report").rglob("*.js") if path.name != "three.js"]
+    page = (run / "report.html").read_text(encoding="utf-8")
+    assert word in page + str([*map(unpacked, scripts)])

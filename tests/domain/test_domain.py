@@ -11,13 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from phyblock.domain.blocks import (
-    BLOCK_TYPES,
-    SHAPES,
-    euler_deg_to_quat_xyzw,
-    orientation_class,
-    quat_xyzw_to_matrix,
-)
+from phyblock.domain import blocks as domain
+from phyblock.domain.blocks import BLOCK_TYPES, SHAPES, orientation_class
 from phyblock.domain.scene import AOVGraph, CycleError, angles_deg
 from tests.scoring.cases import acyclic, any_edges
 from tests.shipped import official_tasks
@@ -28,8 +23,9 @@ GRID_EULERS = st.tuples(*[st.sampled_from([-90, 0, 30, 45, 60, 90, 120, 180, 270
 TYPES = st.sampled_from(BLOCK_TYPES)
 
 
-def half_disc(radius, segments):
-    angles = [math.pi * i / segments for i in range(segments + 1)]
+def arc(radius, step_deg, end_deg=180):
+    """Points around the origin, from the first axis on."""
+    angles = np.radians(np.arange(0, end_deg + 1, step_deg))
     return [(radius * math.cos(angle), radius * math.sin(angle)) for angle in angles]
 
 
@@ -48,18 +44,12 @@ VERTICES = {
     "cuboid1": box(0.025, 0.025, 0.0125),
     "cuboid2": box(0.05, 0.025, 0.0125),
     "cuboid3": box(0.075, 0.025, 0.0125),
-    "cylinder": np.array(
-        [
-            (0.025 * math.cos(math.pi * i / 9), 0.025 * math.sin(math.pi * i / 9), z)
-            for i in range(18)
-            for z in (-0.05, 0.05)
-        ]
-    ),
-    "semi_cylinder": extruded(half_disc(0.025, 10)),
+    "cylinder": np.array([(*at, z) for at in arc(0.025, 20, 340) for z in (-0.05, 0.05)]),
+    "semi_cylinder": extruded(arc(0.025, 18)),
     "triangle": extruded([(-0.05 / 2**0.5, 0), (0.05 / 2**0.5, 0), (0, 0.05 / 2**0.5)]),
     "arch": extruded(
         [(-0.05, -0.025), (0.05, -0.025), (0.05, 0.025), (-0.05, 0.025)]
-        + [(y, z - 0.025) for y, z in half_disc(0.0375, 10)]
+        + [(y, z - 0.025) for y, z in arc(0.0375, 18)]
     ),
 }
 
@@ -76,39 +66,26 @@ def rotation(euler_deg):
 
 @given(euler_deg=EULERS)
 def test_euler_angles_are_extrinsic_x_y_z(euler_deg):
-    quat_xyzw = euler_deg_to_quat_xyzw(euler_deg)
-    assert np.linalg.norm(quat_xyzw) == pytest.approx(1)
-    expected = rotation(euler_deg)
+    quat_xyzw, expected = domain.euler_deg_to_quat_xyzw(euler_deg), rotation(euler_deg)
     same_sign = np.sign(quat_xyzw @ expected.as_quat())
     np.testing.assert_allclose(same_sign * quat_xyzw, expected.as_quat(), atol=1e-9)
-    np.testing.assert_allclose(quat_xyzw_to_matrix(quat_xyzw), expected.as_matrix(), atol=1e-9)
+    matrix = domain.quat_xyzw_to_matrix(quat_xyzw)
+    np.testing.assert_allclose(matrix, expected.as_matrix(), atol=1e-9)
 
 
-TURNS = st.tuples(*[st.integers(-2, 2)] * 3)
-
-
-@given(block_type=TYPES, one=GRID_EULERS, other=GRID_EULERS, turns=TURNS)
-def test_orientations_are_one_class_exactly_when_the_block_looks_alike(
-    block_type, one, other, turns
-):
+@given(TYPES, GRID_EULERS, GRID_EULERS, st.tuples(*[st.integers(-2, 2)] * 3))
+def test_orientations_are_one_class_exactly_when_the_block_looks_alike(kind, one, other, turns):
     """And whole turns change nothing."""
-    name = orientation_class(block_type, one)
-    same = name == orientation_class(block_type, other)
-    assert same == looks_alike(block_type, rotation(one), rotation(other))
     more = tuple(angle + 360 * turn for angle, turn in zip(one, turns, strict=True))
-    assert orientation_class(block_type, more) == name
+    name, second, third = (orientation_class(kind, euler) for euler in (one, other, more))
+    assert (name == second) == looks_alike(kind, rotation(one), rotation(other))
+    assert third == name
 
 
-QUARTER_TURNS = list(itertools.product((0, 90, 180, 270), repeat=3))
+TURNS = [*itertools.product((0, 90, 180, 270), repeat=3), *((0, 0, n) for n in range(20, 360, 20))]
 SYMMETRIES = {
-    block_type: [
-        turn
-        for turn in map(
-            rotation, [*QUARTER_TURNS, *((0, 0, angle) for angle in range(20, 360, 20))]
-        )
-        if looks_alike(block_type, turn, Rotation.identity())
-    ]
-    for block_type in BLOCK_TYPES
+    kind: [one for one in map(rotation, TURNS) if looks_alike(kind, one, Rotation.identity())]
+    for kind in BLOCK_TYPES
 }
 
 
@@ -136,8 +113,6 @@ def test_sizes_are_those_of_the_kit(block_type):
     np.testing.assert_allclose(shape.high_m, VERTICES[block_type].max(axis=0), atol=1e-9)
     assert shape.mass_kg == pytest.approx(1040 * shape.volume_m3)
 
-
-# The AOV graph.
 
 SEEDS = st.integers(0, 2**32 - 1)
 

@@ -85,7 +85,6 @@ def test_a_state_holds_the_goal_and_the_candidates():
             assert row[3:6] == pytest.approx(block.euler_deg, abs=1e-3)
             assert row[6:] == pytest.approx(block.position_m, abs=1e-5)
         assert env.action_masks().sum() == 1 + len(task.candidates)
-    env.close()
 
 
 def test_a_text_is_the_prompt_of_step_planning_after_the_same_steps():
@@ -103,7 +102,6 @@ def test_a_text_is_the_prompt_of_step_planning_after_the_same_steps():
         if action < 17:
             episode.step(f"Next plan: Move({action})")
             observation = env.step(action)[0]
-    env.close()
 
 
 @pytest.mark.parametrize("options", [{}, {"action": "pose"}], ids=["blocks", "poses"])
@@ -140,17 +138,16 @@ def test_a_wrong_move_changes_nothing_and_a_finished_assembly_looks_like_the_goa
     [("off", (), False), ("settle", (3,), False), ("strict", (3,), True)],
 )
 def test_what_physics_does_with_what_cannot_stand(physics, fallen, ended):
-    env = PhyBlockEnv([seesaw()], physics=physics, size_px=128)
-    env.reset()
-    env.step(1)
-    observation, reward, has_ended, _, info = env.step(3)
+    def played(physics):
+        env = PhyBlockEnv([seesaw()], physics=physics, size_px=128)
+        env.reset()
+        env.step(1)
+        return env.step(3)
+
+    observation, reward, has_ended, _, info = played(physics)
     assert (reward, info["fallen"], has_ended) == (1, fallen, ended)
-    held = PhyBlockEnv([seesaw()], physics="off", size_px=128)
-    held.reset()
-    held.step(1)
-    expected = held.step(3)[0]["current"]
+    expected = played("off")[0]["current"]
     assert np.array_equal(observation["current"], expected) == (physics != "strict")
-    env.close()
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ the official recordings.
 
 import json
 import time
-from collections import Counter
+from collections import Counter, defaultdict
 from pathlib import Path
 
 import pytest
@@ -33,12 +33,8 @@ READERS = {
 SAID = {
     "plan": lambda plan: f"{' '.join(map(str, plan.plan.steps))}{' cut' * plan.truncated}",
     "move": lambda read: f"{'done' if read.is_done else read.move} {read.rule}",
-    **dict.fromkeys(
-        ("choice", "number", "order"), lambda answer: f"{answer.letters} {answer.rule}"
-    ),
     "poses": lambda plan: "; ".join(
-        f"{step.candidate} at {', '.join(f'{one:g}' for one in step.center_cm)}"
-        for step in plan.steps
+        "{} at {:g}, {:g}, {:g}".format(step.candidate, *step.center_cm) for step in plan.steps
     ),
 }
 HERE = Path(__file__).parent
@@ -55,7 +51,8 @@ ROWS = [
 @pytest.mark.parametrize(("reader", "said", "text"), ROWS)
 def test_a_reply_is_read_as_it_says_or_has_a_named_problem(reader, said, text):
     parsed = READERS[reader](text)
-    assert (parsed.problem or SAID[reader](parsed)) == said
+    told = SAID.get(reader, lambda answer: f"{answer.letters} {answer.rule}")
+    assert (parsed.problem or told(parsed)) == said
 
 
 PLAN = (7, 7, 12, 3, 5, 9, 14, 2, 1)
@@ -82,7 +79,6 @@ prose = st.lists(
     ).filter(lambda line: not any(c.isdigit() for c in line)),
     max_size=4,
 ).map("\n".join)
-harmless = st.text(st.sampled_from("xyz ,.\n"), max_size=80)
 
 
 @given(plans, prose, prose)
@@ -90,18 +86,12 @@ def test_text_without_numbers_around_the_asked_form_never_changes_it(steps, befo
     assert parse_plan(f"{before}\n\n{plan_text(*steps)}\n\n{behind}", N).plan.steps == tuple(steps)
 
 
-DRESSES = (
-    *("{}", "**{}**", "- {}", "> {}", "* *{}*", "`{}`", "| {} |", '"{}",', "   {}  ", "{}."),
-    "# {}",
+dresses = st.sampled_from(
+    ["{}", "**{}**", "- {}", "> {}", "* *{}*", "`{}`", "| {} |", '"{}",', "   {}  ", "{}.", "# {}"]
 )
 
 
-@given(
-    plans,
-    st.sampled_from(DRESSES),
-    st.sampled_from(("\n", "\n\n", "  \n", "\r\n")),
-    st.booleans(),
-)
+@given(plans, dresses, st.sampled_from(("\n", "\n\n", "  \n", "\r\n")), st.booleans())
 def test_decoration_and_fences_change_nothing(steps, dress, between, is_fenced):
     lines = between.join(dress.format(line) for line in plan_text(*steps).split("\n"))
     text = f"```json\n{{\n{lines}\n}}\n```" if is_fenced else lines
@@ -117,19 +107,16 @@ def test_numbering_candidates_otherwise_numbers_the_plan_otherwise(steps, order)
 
 @given(st.integers(1, 16), st.text(st.sampled_from("abc ,.\n"), max_size=80), st.booleans())
 def test_what_stands_before_the_asked_form_of_a_move_changes_nothing(number, text, is_json):
-    asked = (
-        json.dumps({"reasoning": text, "operation": f"Move({number})"})
-        if is_json
-        else f"Next plan: Move({number})"
-    )
+    asked = f"Next plan: Move({number})"
+    if is_json:
+        asked = json.dumps({"reasoning": text, "operation": f"Move({number})"})
     assert parse_move(f"{text}\n{asked}").move == number
 
 
-@given(
-    harmless,
-    st.sampled_from("ABCD"),
-    st.sampled_from(("Answer: {}", "**Answer: {}**", "\\boxed{{{}}}")),
-)
+forms = st.sampled_from(("Answer: {}", "**Answer: {}**", "\\boxed{{{}}}"))
+
+
+@given(st.text(st.sampled_from("xyz ,.\n"), max_size=80), st.sampled_from("ABCD"), forms)
 def test_text_before_the_asked_line_changes_nothing(text, letter, form):
     whole = f"{text}\n{form.format(letter)}"
     assert parse_answer(whole, OPTIONS, is_ordering=False).letters == letter
@@ -176,19 +163,16 @@ MOST_RATIO = 3.0  # 2 is linear, 4 quadratic.
 SMALL_S = 0.05  # Times below this say nothing.
 
 
-def seconds(read, text):
-    """Return the CPU time of reading a text."""
-    start = time.process_time()
-    read(text)
-    return time.process_time() - start
-
-
 def check(read, piece):
     """Fail where 50 KB take much more than twice the time of 25 KB, each time."""
     whole = (piece * (SIZE // len(piece) + 1))[:SIZE]
     for _ in range(6):
-        took = seconds(read, whole)
-        if took < SMALL_S or took < MOST_RATIO * seconds(read, whole[: SIZE // 2]):
+        start = time.process_time()
+        read(whole)
+        middle = time.process_time()
+        read(whole[: SIZE // 2])
+        took, half = middle - start, time.process_time() - middle
+        if took < max(SMALL_S, MOST_RATIO * half):
             return
     pytest.fail(f"{len(whole)} characters take {took:.3f} s")
 
@@ -224,17 +208,14 @@ def test_any_text_is_read_or_a_named_problem(name, text):
 
 
 def test_every_recorded_reply_is_read_as_counted(official_checkout):
-    found = {}
+    found = defaultdict(Counter)
     for (model, _), text in reply_texts(official_checkout).items():
         parsed = parse_plan(text, N)
-        official = parse_plan(text, N, "official").plan
-        counts = found.setdefault(model, Counter())
-        counts["replies"] += 1
-        counts[parsed.rule or "unread"] += 1
-        counts["truncated"] += parsed.truncated
-        counts["blocks"] += len(parsed.plan.steps)
-        counts["dropped"] += len(parsed.dropped)
-        counts["as_official"] += parsed.plan == official
+        found[model] += Counter({
+            "replies": 1, parsed.rule or "unread": 1, "truncated": parsed.truncated,
+            "blocks": len(parsed.plan.steps), "dropped": len(parsed.dropped),
+            "as_official": parsed.plan == parse_plan(text, N, "official").plan,
+        })  # fmt: skip
     known = {row.pop("model"): row for row in csv_rows(HERE / "recordings.csv")}
     for model, counts in found.items():
         assert {name: str(counts[name]) for name in known[model]} == known[model], model

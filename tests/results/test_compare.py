@@ -22,9 +22,16 @@ def plans(model, right):
     return [record(model, scene, 0, [score(tp, 4 - tp, 4 - tp)]) for scene, tp in right.items()]
 
 
+ONE_WAY = {"seeds": [0], "settings": ["A"], "matchers": ["optimal"]}
+
+
 def one_seed(*records, **facts):
-    wanted = {"seeds": [0], "settings": ["A"], "matchers": ["optimal"], **facts}
-    return run_of(records, manifest(**wanted))
+    return run_of(records, manifest(**ONE_WAY | facts))
+
+
+def overall(*runs, **about):
+    """Return what a comparison says of all parts together."""
+    return compare(*runs, **about).table.set_index("part").loc["overall"]
 
 
 @laws
@@ -49,10 +56,9 @@ def test_only_samples_that_both_have_are_compared():
         *plans("beta", {"001": 4, "002": 0, "003": 4}),
         record("beta", "000", outcome="missing", scores=[score(0, 0, 4)]),
     )
-    row = compare(run).table.set_index("part").loc["overall"]
-    assert (row["n_samples"], row["n_scenes"], row["n_clusters"]) == (2, 2, 2)
-    assert (row["value_a"], row["value_b"], row["difference"]) == (25, 50, -25)
-    assert (row["better"], row["worse"], row["same"]) == (0, 1, 1)
+    wanted = {"n_samples": 2, "n_scenes": 2, "n_clusters": 2, "better": 0, "worse": 1, "same": 1}
+    wanted |= {"value_a": 25, "value_b": 50, "difference": -25}
+    assert overall(run)[[*wanted]].to_dict() == wanted
 
 
 def test_a_model_without_any_reply_is_not_compared_though_empty_plans_count():
@@ -63,42 +69,29 @@ def test_a_model_without_any_reply_is_not_compared_though_empty_plans_count():
     assert set(compare(run).table["verdict"]) == {"nothing to compare"}
     some = record("beta", "000", scores=[score(3, 1, 1)])
     run = one_seed(*plans("alpha", dict.fromkeys(LEVELS, 3)), some, *silent[1:], missing="count")
-    row = compare(run).table.set_index("part").loc["overall"]
-    assert (row["n_samples"], row["better"], row["same"]) == (5, 4, 1)
+    assert overall(run)[["n_samples", "better", "same"]].tolist() == [5, 4, 1]
 
 
 def test_what_cannot_be_told_is_said():
     for n, verdict in ((12, "cannot tell"), (4, "too few base scenes to tell")):
         right = {f"{scene:03}": 1 + scene % 3 for scene in range(n)}
         other = {scene: 4 - tp for scene, tp in right.items()}
-        run = one_seed(
-            *plans("alpha", right),
-            *plans("beta", other),
-            scenes_by_level={2: n},
-            scenes=n,
-            levels=[2],
-        )
-        verdicts = compare(run).table.set_index("part")["verdict"]
-        assert verdicts["overall"] == verdict
+        size = {"scenes_by_level": {2: n}, "scenes": n, "levels": [2]}
+        run = one_seed(*plans("alpha", right), *plans("beta", other), **size)
+        assert overall(run)["verdict"] == verdict
 
 
 def test_a_gap_is_found_among_many_models_and_ranks_say_what_is_sure():
     scenes = [f"{n:03}" for n in range(60)]
     draw = np.random.default_rng(7)
     strength = {"best": 0.75, **{f"model-{n:02}": 0.5 for n in range(25)}}
-    run = one_seed(
-        *(
-            one
-            for model, share in strength.items()
-            for one in plans(model, {scene: int(draw.binomial(4, share)) for scene in scenes})
-        ),
-        models=list(strength),
-        scenes_by_level={2: 60},
-        items={"full_planning": 60},
-        scenes=60,
-        levels=[2],
-    )
-    found = compare(run)
+    records = [
+        one
+        for model, share in strength.items()
+        for one in plans(model, {scene: int(draw.binomial(4, share)) for scene in scenes})
+    ]
+    size = {"scenes_by_level": {2: 60}, "items": {"full_planning": 60}, "scenes": 60}
+    found = compare(one_seed(*records, models=list(strength), levels=[2], **size))
     assert len(found.table) == 26 * 25 // 2
     against_best = found.table[found.table["a"] == "best"]
     assert (against_best["verdict"] == "best is better").all()
@@ -109,22 +102,13 @@ def test_a_gap_is_found_among_many_models_and_ranks_say_what_is_sure():
 
 def test_two_runs_are_compared_by_the_models_they_share_or_by_two_named():
     first = one_seed(*plans("alpha", {"000": 4, "001": 2}), models=["alpha"])
-    second = run_of(
-        [*plans("alpha", {"000": 1, "001": 1}), *plans("beta", {"000": 4, "001": 4})],
-        manifest(seeds=[0]),
-    )
-    second = replace(second, path=Path("other"))
-    shared = compare(first, second).table.set_index("part")
-    assert shared.loc["overall", ["a", "b"]].tolist() == ["alpha (run)", "alpha (other)"]
-    assert shared.loc["overall", "difference"] == 50
-    named = compare(first, second, ["alpha", "beta"]).table.set_index("part")
-    assert named.loc["overall", "difference"] == -25
+    records = [*plans("alpha", {"000": 1, "001": 1}), *plans("beta", {"000": 4, "001": 4})]
+    second = replace(run_of(records, manifest(seeds=[0])), path=Path("other"))
+    shared = overall(first, second)[["a", "b", "difference"]].tolist()
+    assert shared == ["alpha (run)", "alpha (other)", 50]
+    assert overall(first, second, models=["alpha", "beta"])["difference"] == -25
     with pytest.raises(SpecError, match="has no such model"):
         compare(first, second, ["beta", "alpha"])
-
-
-OTHER_TRACK = manifest(seeds=[0])
-OTHER_TRACK["suite"]["tracks"] = ["vqa"]
 
 
 @pytest.mark.parametrize(
@@ -134,7 +118,7 @@ OTHER_TRACK["suite"]["tracks"] = ["vqa"]
         (one_seed(matchers=["paper"]), r"scoring\.matchers: cannot be compared with run"),
         (one_seed(level1="membership"), r"scoring\.level1: cannot be compared with run"),
         (one_seed(models=["beta"]), "no model in common"),
-        (run_of([], OTHER_TRACK), "no such track to compare"),
+        (one_seed(suite={"tracks": ["vqa"]}), "no such track to compare"),
     ],
 )
 def test_runs_that_cannot_be_compared_are_refused(other, said):
@@ -155,7 +139,7 @@ def test_the_first_runs_policy_on_missing_replies_holds_for_both():
 
     for missing, samples in (("skip", 1), ("count", 3)):
         other = of("count" if missing == "skip" else "skip", "001")
-        row = compare(of(missing, "000"), other).table.set_index("part").loc["overall"]
+        row = overall(of(missing, "000"), other)
         assert (row["n_samples"], row["difference"]) == (samples, 0)
 
 
@@ -166,9 +150,8 @@ ASKED = {"alpha": ITEMS, "beta": ITEMS, "gamma": ITEMS}
 
 def test_what_two_runs_asked_differently_is_named():
     def asked(**images):
-        facts = manifest(seeds=[0], settings=["A"], matchers=["optimal"])
-        facts["suite"] |= {"images": {"size_px": 512, **images}, "name": f"n{len(images)}"}
-        return run_of(plans("alpha", {"000": 4, "001": 2}), facts)
+        suite = {"images": {"size_px": 512, **images}, "name": f"n{len(images)}"}
+        return one_seed(*plans("alpha", {"000": 4, "001": 2}), suite=suite)
 
     assert "differ" not in compare(asked(), asked()).how
     how = compare(asked(), asked(size_px=256)).how
@@ -177,8 +160,7 @@ def test_what_two_runs_asked_differently_is_named():
 
 def varied(models):
     """Return a run of the first so many scenes of each model in every way, of others in one way."""
-    told = manifest(models=models, seeds=(0, 1), levels=(2,), settings=["A"], matchers=["optimal"])
-    told["suite"]["vary"] = VARY
+    told = manifest(**ONE_WAY | {"seeds": (0, 1)}, models=models, levels=(2,), suite={"vary": VARY})
     rng, records, variants = np.random.default_rng(3), [], VarySpec(**VARY).variants
     for model, place, seed, variant in product(models, range(ITEMS), (0, 1), variants):
         if place < models[model] or variant is variants[0]:

@@ -5,6 +5,7 @@ import base64
 import csv
 import io
 import json
+from itertools import product
 
 import pandas as pd
 import pytest
@@ -15,36 +16,32 @@ from phyblock.integrations import files
 from phyblock.results.load import load_run
 from phyblock.results.tables import export_frame, write_csv
 from tests.web.factory import LEVELS, asked, manifest, record, score, write_run
-from tests.workspace import csv_rows
+from tests.workspace import csv_rows, write_lines
 
 
 @pytest.fixture
 def folder(tmp_path):
-    facts = manifest()
-    facts["suite"]["tracks"] = ["full_planning", "vqa"]
     records = []
-    for place, scene in enumerate(LEVELS):
-        for seed in (0, 1):
-            scores = [score(place, 1, 1), score(place, 0, 1, setting="B")]
-            records.append(record("alpha", scene, seed, scores, prompt_tokens=100))
+    for (place, scene), seed in product(enumerate(LEVELS), (0, 1)):
+        scores = [score(place, 1, 1), score(place, 0, 1, setting="B")]
+        records.append(record("alpha", scene, seed, scores, prompt_tokens=100))
     records[0]["prompt"] = {"template": "x", "version": "1", "images": [], "messages": "d1"}
     records[1] = record("alpha", "000", 1, [score(0, 0, 4)], outcome="missing")
     records += [asked(1, "SH", "A", 0), asked(1, "SH", "B", 1)]
     records.append(record("beta", "000", 0, outcome="api_error"))
+    facts = manifest(suite={"tracks": ["full_planning", "vqa"]})
     made = write_run(tmp_path / "run", records, facts)
     prompt = {"role": "user", "parts": ["Look at", {"image": "goal"}]}
-    line = json.dumps({"sha256": "d1", "messages": [prompt]})
-    (made / "prompts.jsonl").write_text(line + "\n", encoding="utf-8")
+    write_lines(made / "prompts.jsonl", [{"sha256": "d1", "messages": [prompt]}])
     return made
 
 
 def test_rows_hold_what_was_asked_answered_and_counted(folder):
     frame = export_frame(load_run(folder)).set_index("sample")
     assert len(frame) == 13
-    row = frame.loc["full_planning/alpha/002/s0"]
-    assert (row["tp_a"], row["fp_a"], row["fn_a"], row["tp_b"]) == (2, 1, 1, 2)
-    assert (row["plan"], row["prompt_tokens"]) == ([1], 100)
-    assert row["reply"] == "Move block with index 1"
+    wanted = {"tp_a": 2, "fp_a": 1, "fn_a": 1, "tp_b": 2, "plan": [1], "prompt_tokens": 100}
+    wanted["reply"] = "Move block with index 1"
+    assert frame.loc["full_planning/alpha/002/s0", [*wanted]].to_dict() == wanted
     assert frame.loc["full_planning/alpha/000/s0", "prompt"] == "Look at\n[picture: goal]"
     assert pd.isna(frame.loc["full_planning/alpha/000/s1", "reply"])
     answer = frame.loc["vqa/alpha/sh-1/s1", ["question_subtask", "answer_given"]]

@@ -98,10 +98,9 @@ def test_writing_again_changes_nothing(tmp_path_factory, records):
 
 def test_the_summary_ranks_models_and_says_who_is_above_the_blind_baseline():
     tp = {"alpha": 1, "beta": 4, "random": 0, "goal-blind": 2}
-    facts = manifest(models=list(tp), seeds=[0], levels=[3, 4])
+    facts = manifest(models=list(tp), seeds=[0], levels=[3, 4], items={"full_planning": 2})
     for model in facts["models"][2:]:
         model["kind"] = "baseline"
-    facts["items"] = {"full_planning": 2}
     records = [
         record(name, scene, scores=[score(n, 4 - n, 4 - n)])
         for name, n in tp.items()

@@ -6,7 +6,6 @@ import json
 import re
 import shutil
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import quote, urlencode
@@ -15,7 +14,7 @@ import pytest
 
 from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat
-from tests.workspace import Workspace, questions, read_lines, write_lines, write_questions
+from tests.workspace import Workspace, questions, write_lines, write_questions
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, BrowserContext, Locator, LocatorAssertions, Page
@@ -39,9 +38,9 @@ def expect(locator: Locator) -> LocatorAssertions:
     return expected(locator)
 
 
-@contextmanager
-def chromium() -> Iterator[Browser]:
-    """A headless Chromium; skips where there is none."""
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    """A headless Chromium; its event loop runs while it does, so that it ends with its module."""
     playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
     found = next(filter(None, map(shutil.which, _CHROMIUMS)), None)
     if found is None:
@@ -50,35 +49,6 @@ def chromium() -> Iterator[Browser]:
         running = started.chromium.launch(executable_path=found, args=_FLAGS)
         yield running
         running.close()
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    """A headless Chromium; its event loop runs while it does, so that it ends with its module."""
-    with chromium() as running:
-        yield running
-
-
-class Visit:
-    """A page, and all that it complained of or asked for."""
-
-    def __init__(self, page: Page) -> None:
-        self.page = page
-        self.complaints: list[str] = []
-        self.requests: list[str] = []
-        page.on("console", lambda message: self._complain(message.text))
-        page.on("pageerror", lambda error: self.complaints.append(str(error)))
-        page.on("dialog", lambda dialog: self.complaints.append(dialog.message))
-        page.on("request", lambda request: self.requests.append(request.url))
-
-    def _complain(self, text: str) -> None:
-        # A driver without a graphics card speaks of its own speed.
-        if "GL Driver Message" not in text:
-            self.complaints.append(text)
-
-    def asked_elsewhere(self, *own: str) -> list[str]:
-        """Return the requests to addresses that do not begin so."""
-        return [url for url in self.requests if not url.startswith(own)]
 
 
 HOSTILE = (
@@ -97,12 +67,27 @@ WITHOUT_WEBGL = """HTMLCanvasElement.prototype.getContext = new Proxy(
         kind.startsWith("webgl") ? null : get.call(canvas, kind, ...more) })"""
 
 
-class PageVisit(Visit):
-    """A report's or a site's page, by its file."""
+class Visit:
+    """A page, of a file if it is one, and all that it complained of or asked for."""
 
-    def __init__(self, page: Page, path: Path) -> None:
-        super().__init__(page)
+    def __init__(self, page: Page, path: Path | None = None) -> None:
+        self.page = page
         self.path = path
+        self.complaints: list[str] = []
+        self.requests: list[str] = []
+        page.on("console", lambda message: self._complain(message.text))
+        page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        page.on("dialog", lambda dialog: self.complaints.append(dialog.message))
+        page.on("request", lambda request: self.requests.append(request.url))
+
+    def _complain(self, text: str) -> None:
+        # A driver without a graphics card speaks of its own speed.
+        if "GL Driver Message" not in text:
+            self.complaints.append(text)
+
+    def asked_elsewhere(self, *own: str) -> list[str]:
+        """Return the requests to addresses that do not begin so."""
+        return [url for url in self.requests if not url.startswith(own)]
 
     def open(self, view: str = "results", **words: str) -> Page:
         """Open a view and wait until it is shown."""
@@ -147,21 +132,18 @@ def made(new_workspace: Callable[..., Workspace]) -> Workspace:
     )
     made.out = made.root / "first"
     made.completed()
-    path = made.out / "records.jsonl"
-    lines = read_lines(path)
-    for record in lines:
-        if record["sample"] == "full_planning/random/t3/s0":
-            record["reply"]["text"] = record["reply"]["reasoning"] = HOSTILE
-            record["parse"]["rule"] = HOSTILE
-        if record["sample"] == "full_planning/oracle/t5/s1":
-            record["reply"]["text"] = PLAN
-            record["parse"]["plan"] = [9, 3]
-            for score in record["scores"]:
-                if score.get("placed"):
-                    score["placed"], score["why"] = [None, 0], ["shape_not_in_gt", None]
-        if record["sample"] == "full_planning/random/t4/s0":
-            record.update(reply=None, outcome="missing", scores=[], parse=None)
-    write_lines(path, lines)
+    lines = made.records()
+    by_name = {record["sample"]: record for record in lines}
+    hostile, planned = (by_name[f"full_planning/{one}"] for one in ("random/t3/s0", "oracle/t5/s1"))
+    hostile["reply"] |= {"text": HOSTILE, "reasoning": HOSTILE}
+    hostile["parse"]["rule"] = HOSTILE
+    planned["reply"]["text"], planned["parse"]["plan"] = PLAN, [9, 3]
+    for score in planned["scores"]:
+        if score.get("placed"):
+            score |= {"placed": [None, 0], "why": ["shape_not_in_gt", None]}
+    lost = {"reply": None, "outcome": "missing", "scores": [], "parse": None}
+    by_name["full_planning/random/t4/s0"].update(lost)
+    write_lines(made.out / "records.jsonl", lines)
     made.does("report", made.out)
     return made
 
@@ -169,15 +151,9 @@ def made(new_workspace: Callable[..., Workspace]) -> Workspace:
 @pytest.fixture(scope="session")
 def troubled(new_workspace: Callable[..., Workspace]) -> Workspace:
     """A run of two models, of which one has no key, limited to two items of each track."""
-    troubled = new_workspace()
-    troubled.write_suite(
-        models=["alpha", "locked"],
-        seeds=[0],
-        limit=2,
-        tracks=["full_planning", "step_planning"],
-        steps={"physics": "off"},
-        description="The 400 scenes.",
-    )
+    troubled, tracks = new_workspace(), ["full_planning", "step_planning"]
+    asked = {"tracks": tracks, "steps": {"physics": "off"}, "seeds": [0], "limit": 2}
+    troubled.write_suite(models=["alpha", "locked"], description="The 400 scenes.", **asked)
     with Running(OpenAIChat()) as good, Running(OpenAIChat(Faults(mode="401"))) as bad:
         troubled.write_served({"alpha": good.url, "locked": bad.url})
         troubled.run()
@@ -218,15 +194,15 @@ def context(browser: Browser) -> Iterator[BrowserContext]:
 
 
 @pytest.fixture
-def visiting(browser: Browser, context: BrowserContext) -> Iterator[Callable[..., PageVisit]]:
+def visiting(browser: Browser, context: BrowserContext) -> Iterator[Callable[..., Visit]]:
     """Visits to pages by their paths, which may complain of nothing and ask for nothing else; one
     that draws has WebGL and a clock of its own.
     """
-    visits: list[PageVisit] = []
+    visits: list[Visit] = []
 
-    def visit(path: Path, *, draws: bool = False) -> PageVisit:
+    def visit(path: Path, *, draws: bool = False) -> Visit:
         page = browser.new_page(**LIGHT) if draws else context.new_page()
-        visits.append(PageVisit(page, path))
+        visits.append(Visit(page, path))
         return visits[-1]
 
     yield visit
@@ -238,10 +214,10 @@ def visiting(browser: Browser, context: BrowserContext) -> Iterator[Callable[...
 
 
 @pytest.fixture
-def visit(visiting: Callable[..., PageVisit], made: Workspace) -> PageVisit:
+def visit(visiting: Callable[..., Visit], made: Workspace) -> Visit:
     return visiting(made.out / "report.html")
 
 
 @pytest.fixture
-def trouble(visiting: Callable[..., PageVisit], troubled: Workspace) -> PageVisit:
+def trouble(visiting: Callable[..., Visit], troubled: Workspace) -> Visit:
     return visiting(troubled.out / "report.html")

@@ -1,6 +1,7 @@
 """Manifests and records for the tests of tables."""
 
 from collections.abc import Iterable, Mapping
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +36,7 @@ def manifest(
     matchers: Iterable[str] = ("optimal", "paper"),
     level1: str = "selection",
     missing: str = "skip",
+    suite: Mapping[str, Any] = {},
     **more: Any,
 ) -> dict[str, Any]:
     named = [(model, None) if isinstance(model, str) else model for model in models]
@@ -47,6 +49,7 @@ def manifest(
             "settings": list(settings),
             "seeds": list(seeds),
             "scoring": {"matchers": list(matchers), "level1": level1, "missing": missing},
+            **suite,
         },
         "models": [{"name": name, "published": published} for name, published in named],
         "scenes_by_level": {n: sum(n in held for held in LEVELS.values()) for n in levels},
@@ -138,22 +141,17 @@ def record_lists(draw: st.DrawFn) -> list[dict[str, Any]]:
     """Records of some samples of `manifest()`, with every score that a run stores."""
     small = st.integers(0, 5)
     records = []
-    for model in ("alpha", "beta"):
-        for scene, levels in LEVELS.items():
-            for seed in (0, 1):
-                if not draw(st.integers(0, 4)):
-                    continue
-                scores = []
-                for setting in "AB":
-                    for matcher in ("optimal", "paper"):
-                        errors = draw(st.tuples(small, small, small, small))
-                        counts = (draw(small), sum(errors), draw(small))
-                        scores.append(
-                            score(*counts, matcher=matcher, setting=setting, errors=errors)
-                        )
-                    if 1 in levels:
-                        counts = (draw(small), draw(small), draw(small))
-                        scores.append(score(*counts, criterion="selection", setting=setting))
-                outcome = draw(st.sampled_from(OUTCOMES))
-                records.append(record(model, scene, seed, scores, outcome))
+    for model, scene, seed in product(("alpha", "beta"), LEVELS, (0, 1)):
+        if not draw(st.integers(0, 4)):
+            continue
+        scores = []
+        for setting in "AB":
+            for matcher in ("optimal", "paper"):
+                errors = draw(st.tuples(small, small, small, small))
+                counts = (draw(small), sum(errors), draw(small))
+                scores.append(score(*counts, matcher=matcher, setting=setting, errors=errors))
+            if 1 in LEVELS[scene]:
+                counts = (draw(small), draw(small), draw(small))
+                scores.append(score(*counts, criterion="selection", setting=setting))
+        records.append(record(model, scene, seed, scores, draw(st.sampled_from(OUTCOMES))))
     return records

@@ -6,7 +6,6 @@ What is answered here is a script's, to test the page: it says nothing of what p
 import re
 from contextlib import contextmanager
 from pathlib import Path
-from types import SimpleNamespace
 
 import pytest
 
@@ -17,7 +16,6 @@ from tests.workspace import SCENES, plan_text, questions, read_lines, until, wri
 SUBTASKS = ("SH", "OR", "AD", "VP")
 PHONE = {"width": 390, "height": 780}
 HOSTILE = "<img src=x onerror=alert(1)></script><script>alert(2)</script>"
-ADA = ("play", "suite.yaml", "--name", "ada")
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +45,7 @@ def workspace(new_workspace):
 @contextmanager
 def sitting(browser, workspace, **options):
     """A page at the address that a browser is started with; it asks for nothing elsewhere."""
-    command = [*ADA, "--out", "ada", "--beside", "out"]
+    command = ["play", "suite.yaml", "--name", "ada", "--out", "ada", "--beside", "out"]
     with Forked(command, workspace.root, workspace.env) as process:
         try:
             line = process.stdout.readline()
@@ -59,21 +57,16 @@ def sitting(browser, workspace, **options):
             note.unlink()
             # Others on the machine can read what a browser is started with.
             assert printed[2] not in address
-            visit = opened(browser, address, **options)
+            context = browser.new_context(**options)
+            visit = Visit(context.new_page())
+            visit.page.goto(address)
+            visit.page.locator("#main h1").wait_for()
             assert visit.page.url == printed[0]
-            yield SimpleNamespace(page=visit.page, process=process, visit=visit)
+            yield visit, process
             assert visit.asked_elsewhere(address, printed[0]) == []
             visit.page.close()
         finally:
             process.kill()
-
-
-def opened(browser, address, **options):
-    context = browser.new_context(**{"viewport": {"width": 1300, "height": 900}, **options})
-    visit = Visit(context.new_page())
-    visit.page.goto(address)
-    visit.page.locator("#main h1").wait_for()
-    return visit
 
 
 def task(page, number):
@@ -91,27 +84,25 @@ def said(record):
     return record["reply"]["text"]
 
 
-def poses(*steps):
-    return "\n".join(f"Step{n}: block {one}" for n, one in enumerate(steps, 1))
-
-
 def test_a_sitting_by_mouse_keys_and_phone_over_a_kill(browser, workspace):
     run = workspace.root / "ada"
-    with sitting(browser, workspace) as sat:
-        begin_with_mouse_and_keys(sat.page, run)
+    with sitting(browser, workspace, viewport={"width": 1300, "height": 900}) as (visit, process):
+        page = visit.page
+        begin_with_mouse_and_keys(page, run)
         # Reloading loses no pick; a kill loses the task at hand alone.
-        sat.page.keyboard.press("5")
-        sat.page.reload()
-        task(sat.page, 3)
-        assert sat.page.locator(".chips b").all_inner_texts() == ["5"]
-        assert not sat.visit.complaints
-        sat.process.kill()
-        sat.page.get_by_text("has stopped").wait_for()
+        page.keyboard.press("5")
+        page.reload()
+        task(page, 3)
+        assert page.locator(".chips b").all_inner_texts() == ["5"]
+        assert not visit.complaints
+        process.kill()
+        page.get_by_text("has stopped").wait_for()
     assert [*map(said, answered(run))] == [plan_text(3, 7), plan_text(12, 1, 7)]
-    with sitting(browser, workspace, viewport=PHONE, has_touch=True, color_scheme="dark") as sat:
-        end_on_a_phone(sat.page, run)
-        assert sat.process.wait() == 0
-        assert not sat.visit.complaints
+    phone = {"viewport": PHONE, "has_touch": True, "color_scheme": "dark"}
+    with sitting(browser, workspace, **phone) as (visit, process):
+        end_on_a_phone(visit.page, run)
+        assert process.wait() == 0
+        assert not visit.complaints
     # It is scored as any model, and stands beside others.
     before = [{**one, "time": None} for one in answered(run)]
     workspace.does("score", run)
@@ -123,9 +114,8 @@ def begin_with_mouse_and_keys(page, run):
     page.get_by_role("button", name="Begin").click()
 
     task(page, 1)
-    for name in ("Candidate 3", "Candidate 7", "Candidate 12"):
+    for name in ("Candidate 3", "Candidate 7", "Candidate 12", "Undo"):
         page.get_by_role("button", name=name).first.click()
-    page.get_by_role("button", name="Undo").click()
     assert page.locator(".chips b").all_inner_texts() == ["3", "7"]
     assert not answered(run)
     shown = sent_to(page)
@@ -151,12 +141,12 @@ def end_on_a_phone(page, run):
     # Goal and candidates one below the other, without the line that is between them.
     halves = [one.bounding_box() for one in page.locator(".window:visible").all()]
     assert [half and round(half["height"] - half["width"]) for half in halves] == [0, 0]
-    page.get_by_role("button", name="Candidate 16").tap()
-    page.get_by_role("button", name="Pause").tap()
+    for name in ("Candidate 16", "Pause"):
+        page.get_by_role("button", name=name).tap()
     page.get_by_role("heading", name="Paused").wait_for()
     assert page.locator("img").count() == 0
-    page.get_by_role("button", name="Continue").tap()
-    page.get_by_role("button", name="Submit 1 step").tap()
+    for name in ("Continue", "Submit 1 step"):
+        page.get_by_role("button", name=name).tap()
     for number in range(4, 8):
         task(page, number)
         fits_the_phone(page)
@@ -176,11 +166,8 @@ def end_on_a_phone(page, run):
     page.get_by_role("button", name="Submit 1 step").tap()
     page.get_by_role("heading", name="How it went").wait_for()
     assert len(answered(run)) == 10
-    assert [*map(said, answered(run)[7:])] == [
-        poses("3 at (0, 0, 2.5)"),
-        poses("5 at (-0.5, 1.25, 5)"),
-        poses("1 at (0, 0, 0)"),
-    ]
+    placed = ("3 at (0, 0, 2.5)", "5 at (-0.5, 1.25, 5)", "1 at (0, 0, 0)")
+    assert [*map(said, answered(run)[7:])] == [f"Step1: block {one}" for one in placed]
     assert {record["question"]["subtask"]: said(record) for record in answered(run)[3:7]} == {
         "SH": "Answer: B",
         "AD": "Answer: B",
@@ -213,10 +200,8 @@ def give_places_by_touch(page):
     """The browser says what is no number of a field; picks are removed, and all is undone."""
     task(page, 8)
     fits_the_phone(page)
-    page.get_by_role("button", name="Candidate 7").first.tap()
-    page.get_by_role("button", name="Candidate 3").first.tap()
-    page.get_by_role("button", name="Remove step 2").tap()
-    page.get_by_role("button", name="Undo").tap()
+    for name in ("Candidate 7", "Candidate 3", "Remove step 2", "Undo"):
+        page.get_by_role("button", name=name).first.tap()
     rows = page.locator(".chips .chip")
     assert [row.get_attribute("aria-label") for row in rows.all()] == ["step 1: 7", "step 2: 3"]
     page.get_by_role("button", name="Remove step 1").tap()
@@ -256,11 +241,8 @@ def sent_to(page):
     page.get_by_text("The model's exact prompt").click()
     shown = page.locator("details .text").all_inner_texts()
     texts = [text for text in shown if not text.startswith("[picture: ")]
-    pictures = {
-        image.evaluate(f"image => {LOOK}.digest(image)")
-        for image in page.locator("figure img").all()
-    }
-    return [*texts, *pictures]
+    images = page.locator("figure img").all()
+    return [*texts, *{image.evaluate(f"image => {LOOK}.digest(image)") for image in images}]
 
 
 def stored_prompt(run, record):
