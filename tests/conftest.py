@@ -14,17 +14,12 @@ from phyblock.data.base import Dataset, QuestionSet
 from tests.fork_server import ONE_THREAD
 from tests.workspace import KEY, KEY_VARIABLE, Raw, Workspace, write_questions
 
-OFFICIAL_MISSING = (
-    "official PhyBlock data not found: put it at ../shared or set PHYBLOCK_OFFICIAL to the folder "
-    "that holds PhyBlock/ and expected/"
-)
-
-# No test asserts on time: what a machine takes for an example says what else it was doing.
+OFFICIAL_MISSING = "no official data: put it at ../shared or set PHYBLOCK_OFFICIAL to its folder"
 EXAMPLES = int(os.environ.get("PHYBLOCK_EXAMPLES", "100"))
 settings.register_profile("phyblock", deadline=None, max_examples=EXAMPLES)
 settings.load_profile("phyblock")
 
-os.environ.update(ONE_THREAD | {KEY_VARIABLE: KEY})
+os.environ.update(ONE_THREAD | {KEY_VARIABLE: KEY, "NO_PROXY": "*"})
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     # A shell has the commands that it starts in the background ignore it, and their children too.
@@ -33,9 +28,7 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 @pytest.hookimpl(wrapper=True)
 def pytest_collection() -> Generator[None, object, object]:
-    """Collected objects stay to the end, and what tests make is mostly gone without a collector:
-    it need not go through the one, nor often through the other.
-    """
+    """Most of what tests make is gone without a collector, and what is collected stays."""
     gc.disable()
     try:
         return (yield)
@@ -46,9 +39,7 @@ def pytest_collection() -> Generator[None, object, object]:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Pages come first, or two processes would make the runs that they show: a process that has
-    nothing left to do takes the last tests of the other.
-    """
+    """Pages come first: two processes that share them late would make their runs twice."""
     items.sort(key=lambda item: "web" not in item.path.parts)
 
 

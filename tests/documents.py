@@ -1,8 +1,5 @@
-"""JSON Schemas of suites, models files, and the lines of runs and data, made from their models.
-
-    python -m tests.documents [FOLDER]      write benchmarks/schemas again
-
-The documentation makes its tables of fields from them; a test compares them with the models.
+"""JSON Schemas of suites, models files, and the lines of runs and data, made from their models:
+`python -m tests.documents [FOLDER]` writes benchmarks/schemas again.
 """
 
 import json

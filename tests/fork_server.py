@@ -1,9 +1,6 @@
-"""Commands in processes of their own that need not import anything again.
-
-The standard library's fork server imports `tests.preloaded` once. A child takes over folder,
-environment, limits and open files and calls `main` as the installed script does. All children have
-the hash seed of the server: what is to be the same in every process is shown by processes that were
-started one by one.
+"""Commands in processes of their own that need not import anything again: the standard library's
+fork server imports `tests.preloaded` once, and a child calls `main` as the installed script does.
+All have the hash seed of the server.
 """
 
 from __future__ import annotations
@@ -33,9 +30,6 @@ ONE_THREAD = {"OMP_NUM_THREADS": "1"}
 would wait for each other, busily, for most of their time.
 """
 
-_ROOT = Path(__file__).parents[1]
-_NOT_WRITTEN = 120
-_MOST_MEMORY_BYTES = 8 * 2**30
 _WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 _CHANGING = {
     **dict.fromkeys(("os.remove", "os.rmdir", "os.mkdir", "os.truncate"), 1),
@@ -63,9 +57,8 @@ def killed(marks: Path, times: int) -> str:
 
 
 class Forked:
-    """A command that was started, as `subprocess.Popen` shows one; it leads a group of its own.
-
-    It can write so many bytes to a file; what it does to files and hosts is written to `deeds`.
+    """A command that was started, as `subprocess.Popen` shows one; it leads a group of its own, can
+    write `bytes_left` to a file, and what it does to files and hosts is written to `deeds`.
     """
 
     def __init__(
@@ -95,9 +88,8 @@ class Forked:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.wait()
-        self.stdout.close()
-        self.stderr.close()
+        with self.stdout, self.stderr:
+            self.wait()
 
     def poll(self) -> int | None:
         return self._process.exitcode
@@ -139,17 +131,14 @@ def _context() -> ForkServerContext:
     """Return the context whose server was started with what tests import."""
     context = get_context("forkserver")
     context.set_forkserver_preload(["tests.preloaded"])
-    with mock.patch.dict(os.environ, {"PYTHONPATH": str(_ROOT), **ONE_THREAD}):
+    root = str(Path(__file__).parents[1])
+    with mock.patch.dict(os.environ, {"PYTHONPATH": root, **ONE_THREAD}):
         forkserver.ensure_running()
     return context
 
 
 def _become(
-    args: list[str],
-    cwd: str,
-    env: Mapping[str, str],
-    bytes_left: int | None,
-    ends: Sequence[Connection],
+    args: list[str], cwd: str, env: dict[str, str], bytes_left: int | None, ends: list[Connection]
 ) -> NoReturn:
     for number, (name, end) in enumerate(zip(("stdout", "stderr"), ends, strict=False), 1):
         os.dup2(end.fileno(), number)
@@ -170,23 +159,30 @@ def _become(
         resource.setrlimit(resource.RLIMIT_FSIZE, (bytes_left, bytes_left))
     if len(ends) > 2:
         sys.dont_write_bytecode = True
-        resource.setrlimit(resource.RLIMIT_AS, (_MOST_MEMORY_BYTES, _MOST_MEMORY_BYTES))
+        resource.setrlimit(resource.RLIMIT_AS, (8 * 2**30, 8 * 2**30))
         _watch_deeds(ends[2].fileno())
     sys.argv = ["phyblock", *args]
     from phyblock.cli.main import main
 
+    code: object = "main always exits"
     try:
         main()
     except SystemExit as ending:
-        _exit(ending.code)
-    raise AssertionError("main always exits")
+        code = ending.code
+    # As the interpreter exits, but without taking every module apart, which takes longest.
+    threading._shutdown()
+    atexit._run_exitfuncs()
+    try:
+        sys.stdout.flush()
+        sys.stderr.flush()
+    except OSError:
+        code = 120
+    os._exit(code if isinstance(code, int) else int(code is not None))
 
 
 def _watch_deeds(file: int) -> None:
-    """Write every change to a file and every connection from now on as a line of JSON.
-
-    Each is an audit event of Python's, and the path (its links followed) or the address that it is
-    about. SQLite opens its files by itself; the event that names the database stands for them all.
+    """Write every change to a file and every connection from now on as a line of JSON: an audit
+    event of Python's, and the path (its links followed) or the address that it is about.
     """
 
     def hook(event: str, arguments: tuple[Any, ...]) -> None:
@@ -206,15 +202,3 @@ def _watch_deeds(file: int) -> None:
             os.write(file, json.dumps([event, about]).encode() + b"\n")
 
     sys.addaudithook(hook)
-
-
-def _exit(code: object) -> NoReturn:
-    """As the interpreter exits, but without taking every module apart, which takes longest."""
-    threading._shutdown()
-    atexit._run_exitfuncs()
-    try:
-        sys.stdout.flush()
-        sys.stderr.flush()
-    except OSError:
-        code = _NOT_WRITTEN
-    os._exit(code if isinstance(code, int) else int(code is not None))

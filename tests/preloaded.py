@@ -1,6 +1,4 @@
-"""Everything that commands import, some of it only when it is needed: imported once, by the server
-that forks the processes of `tests.fork_server`.
-"""
+"""All that commands import: imported once, by the server that forks `tests.fork_server`'s."""
 
 import contextlib
 import gc
@@ -17,14 +15,8 @@ _PRELOADED = (
     *("PIL.GifImagePlugin", "PIL.JpegPresets", "aiohttp", "matplotlib.backends.backend_agg"),
     *("matplotlib.backends.backend_svg", "matplotlib.pyplot", "pandas.core.methods.to_dict"),
     *("pandas.io.formats.csvs", "phyblock.run.runner", "phyblock.results.tables"),
-    *(
-        "phyblock.making.cli",
-        "phyblock.sim.pybullet",
-        "phyblock.web.pages",
-        "pyarrow.pandas_compat",
-        "sqlite3",
-        "yarl",
-    ),
+    *("phyblock.making.cli", "phyblock.sim.pybullet", "phyblock.web.pages"),
+    *("pyarrow.pandas_compat", "sqlite3", "yarl"),
 )
 
 for module in pkgutil.iter_modules(phyblock.cli.__path__, "phyblock.cli."):

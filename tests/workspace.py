@@ -45,7 +45,6 @@ TWICE = {"max_attempts": 2, "retry_for_s": 0.0}
 KEY_VARIABLE = "PHYBLOCK_TEST_KEY"
 """The variable that holds the key of every model here."""
 KEY = "sk-not-a-real-key-1234"
-_CUBE_M = 0.05
 _COLORS = ("red", "yellow", "blue", "green", "orange")
 
 
@@ -84,9 +83,9 @@ def problem_of(error: type[PhyblockError], work: Callable[..., object], *args: o
     return problem
 
 
-def until(is_so: Callable[[], bool]) -> None:
+def until(is_so: Callable[[], object], timeout_s: float = 30.0) -> None:
     """Wait for what a process or a thread of its own is about to do."""
-    end = time.monotonic() + 30
+    end = time.monotonic() + timeout_s
     while not is_so():
         assert time.monotonic() < end
         time.sleep(0.005)
@@ -124,26 +123,20 @@ def files_below(folder: Path) -> dict[str, bytes]:
     }
 
 
-def candidates() -> list[Raw]:
-    """Sixteen candidates that all differ; the first five are the cubes."""
-    looks = [("cube", color, 0) for color in _COLORS]
-    looks += [("cylinder", color, 0) for color in _COLORS]
-    looks += [("cuboid2", "green", 0), ("cuboid2", "green", 90)]
-    looks += [("arch", "red", 0), ("arch", "red", 90)]
-    looks += [("triangle", "orange", 0), ("triangle", "orange", 90)]
-    return [{"type": t, "color": c, "euler": [0, 0, turn]} for t, c, turn in looks]
-
-
 def tower(scene_id: str, levels: list[int], colors: tuple[str, ...]) -> Raw:
-    """Cubes of the given colors, each on the one before."""
+    """Cubes of the given colors, each on the one before, and sixteen candidates that all differ."""
     blocks = []
     for i, color in enumerate(colors, 1):
-        place = {"layer": i, "depend": [i - 1], "position": [0, 0, (i - 0.5) * _CUBE_M]}
-        cube = {"type": "cube", "color": color, "euler": [0, 0, 0]}
-        blocks.append({"order": i, **cube, **place})
+        cube = {"order": i, "type": "cube", "color": color, "euler": [0, 0, 0]}
+        place = {"layer": i, "depend": [i - 1], "position": [0, 0, (i - 0.5) * 0.05]}
+        blocks.append(cube | place)
+    looks = [(kind, color, 0) for kind in ("cube", "cylinder") for color in _COLORS]
+    turned = (("cuboid2", "green"), ("arch", "red"), ("triangle", "orange"))
+    looks += [(*kind, turn) for kind in turned for turn in (0, 90)]
+    offered = [{"type": t, "color": c, "euler": [0, 0, turn]} for t, c, turn in looks]
     needed = [
-        {**c, "required": colors.count(c["color"]) if c["type"] == "cube" else 0}
-        for c in candidates()
+        {**one, "required": colors.count(one["color"]) if one["type"] == "cube" else 0}
+        for one in offered
     ]
     named = {"id": scene_id, "levels": levels, "parents": [scene_id]}
     return {**named, "blocks": blocks, "candidates": needed}
@@ -181,7 +174,7 @@ class Workspace:
         self.env = {
             "PATH": os.environ["PATH"],
             "HOME": str(root),
-            # What is tested is what stands beside the tests, wherever phyblock is installed from.
+            # Wherever phyblock is installed from.
             "PYTHONPATH": str(Path(__file__).parents[1]),
             "PHYBLOCK_CACHE": str(self.cache),
             "LITELLM_LOCAL_MODEL_COST_MAP": "True",
@@ -195,18 +188,10 @@ class Workspace:
         return write_lines(folder / "scenes.jsonl", scenes or SCENES).parent
 
     def write_suite(self, *, name: str = "trial", **fields: Any) -> Path:
-        """`suite.yaml`: small pictures, the scenes of `data`, baselines only
-        where `models` names them; `fields` replace whole sections.
-        """
-        suite = {
-            "name": name,
-            "dataset": {"format": "builtin", "path": "./data"},
-            "images": {"size_px": 128},
-            "models": ["random", "oracle"],
-            "baselines": [],
-            **fields,
-        }
-        return self.write_yaml("suite.yaml", suite)
+        """`suite.yaml` with small pictures and no baselines; `fields` replace whole sections."""
+        suite = {"name": name, "dataset": {"format": "builtin", "path": "./data"}}
+        suite |= {"images": {"size_px": 128}, "models": ["random", "oracle"], "baselines": []}
+        return self.write_yaml("suite.yaml", suite | fields)
 
     def write_models(self, url: str, *names: str, **fields: Any) -> Path:
         """`models.yaml`: each name is a model of the local server at `url`."""
@@ -244,9 +229,7 @@ class Workspace:
         return Done(done.returncode, done.stdout, done.stderr)
 
     def run(self, *args: str | Path, page: bool = False, **options: Any) -> Done:
-        """`phyblock run suite.yaml --out out`, and what more is given; figures and page take
-        seconds, so they are made where a test is about them.
-        """
+        """`phyblock run suite.yaml --out out`, with figures and page where a test is about them."""
         less = () if page else ("--no-report",)
         return self.phyblock("run", "suite.yaml", "--out", self.out, *less, *args, **options)
 
@@ -268,9 +251,7 @@ class Workspace:
     def served(
         self, server: S, *names: str, entry: Mapping[str, Any] | None = None, **suite: Any
     ) -> Iterator[S]:
-        """A server of models of these names, `alpha` alone by default, and a suite that asks them
-        unless it names others; `entry` has more fields of their entries.
-        """
+        """A server of models of these names, or `alpha`, with an entry, and a suite for them."""
         from tests.servers.chassis import Running
 
         names = names or ("alpha",)
@@ -292,12 +273,6 @@ class Workspace:
 
         known = {} if models is None else load_models(self.root / models)
         return make_plan(load_suite(self.root / "suite.yaml"), known)
-
-    def scored(self, name: str = "scored") -> Path:
-        """Copy the run, score the copy again, and return it."""
-        copy = shutil.copytree(self.out, self.root / name)
-        self.does("score", copy, "--jobs", "1")
-        return copy
 
     def start(self, *args: str | Path) -> Forked:
         """Start `run` and return at once; the process leads a group of its own."""
@@ -326,9 +301,6 @@ class Workspace:
         return {name: data for name, data in found if "pictures" not in name.split("/")}
 
 
-VIEW = [45, 22]
-
-
 def question(subtask: str, scene: Raw, number: int, rng: np.random.Generator) -> Raw:
     """A question of a subtask about a scene; the right letter is drawn."""
     letters = [str(letter) for letter in rng.permutation(list(LETTERS))]
@@ -341,7 +313,7 @@ def question(subtask: str, scene: Raw, number: int, rng: np.random.Generator) ->
         "question": f"A question of kind {subtask}, number {number}, about the red cube?",
         "options": [str(word) for word in rng.permutation(["cube", "arch", "cylinder", "cuboid"])],
         "answer": letters[0],
-        "pictures": [{"label": "scene", "view": VIEW}],
+        "pictures": [{"label": "scene", "view": [45, 22]}],
         "evidence": {"slots": {}},
     }
     if subtask in ("VP", "CF", "PD", "OR"):
@@ -361,14 +333,12 @@ def question(subtask: str, scene: Raw, number: int, rng: np.random.Generator) ->
         ]
         made["pictures"][0]["marks"] = marks
         orders = [block["order"] for block in scene["blocks"]]
-        made["pictures"].append({"label": "block", "view": VIEW, "without": orders[1:]})
+        made["pictures"].append({"label": "block", "view": [45, 22], "without": orders[1:]})
     return made
 
 
 def questions(
-    scenes: Sequence[Raw] = SCENES,
-    per_subtask: int = 4,
-    subtasks: Sequence[str] = SUBTASKS,
+    scenes: Sequence[Raw] = SCENES, per_subtask: int = 4, subtasks: Sequence[str] = SUBTASKS
 ) -> list[Raw]:
     """Questions of every subtask, about the scenes in turn."""
     rng = np.random.default_rng(7)
@@ -387,8 +357,4 @@ def write_questions(folder: Path, made: Sequence[Raw] | None = None) -> Path:
 
 def vqa_suite(**fields: Any) -> Raw:
     """Fields of a suite that asks the questions in `questions`; `fields` go into its section."""
-    return {
-        "tracks": ["vqa"],
-        "vqa": {"path": "./questions", **fields},
-        "images": {"size_px": 128},
-    }
+    return {"tracks": ["vqa"], "vqa": {"path": "./questions", **fields}}

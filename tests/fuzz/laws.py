@@ -2,19 +2,17 @@
 
 1. The exit code is 0, 1, 2 or 130, there is never a traceback, and code 2 says what is wrong.
 2. No file outside the run folder and the cache changes, and none of the user's in the run folder.
-3. What was answered is kept, and is never asked again (the server's own `Ledger` tells exactly);
-   what was refused for good is not asked again either, unless it is told to. What failed may be.
+3. What was answered is kept, and is never asked again; what was refused for good is not asked again
+   either, unless it is told to. What failed may be.
 """
 
 import contextlib
 import json
 import os
-import shutil
 import subprocess
 import tempfile
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -24,16 +22,16 @@ from tests.fork_server import Done, run_forked
 from tests.servers.chassis import Seen
 from tests.servers.faults import WIRE_FAULTS
 from tests.servers.openai_chat import OpenAIChat, answered
-from tests.workspace import SHARED, Workspace, files_below
+from tests.workspace import SHARED, Workspace, files_below, vqa_suite
 
-CODES = (0, 1, 2, 130)
-_COMPLAINTS = ("error: ", "Error: ")
 _DEVICES = ("/dev/null", "/dev/tty", "/dev/shm")
-_LOCAL = ("127.0.0.1", "localhost", "::1")
-_LONGEST_S = 30.0
-"""A command on small files that is not done by then hangs [s]."""
-_LONGEST_SHOWN = 1500
 _KEPT_FILES = ("records.jsonl", "calls.jsonl")
+TRACKS: dict[str, tuple[int, dict[str, Any]]] = {
+    "full_planning": (5, {}),
+    "vqa": (12, vqa_suite(subtasks=["SH", "OR", "VP"])),
+    "step_planning": (15, {"tracks": ["step_planning"], "steps": {"physics": "off"}}),
+}
+"""By track: at least how many requests a seed makes, and the suite."""
 
 
 class Broken(NamedTuple):
@@ -53,12 +51,12 @@ def watched(
     workspace: Workspace,
     may_write: Sequence[str],
     lasting: Sequence[str] = (),
-    longest_s: float = _LONGEST_S,
+    longest_s: float = 30.0,
 ) -> tuple[Done, list[Broken]]:
     """Run a command to its end, or for its longest time; return its end and the laws it broke.
 
-    `may_write` are the paths that the command is to write in, beside the cache, and `lasting` those
-    of the user's files that stand there all the same.
+    `may_write` are the paths that the command is to write in, beside the cache; `lasting` those of
+    the user's files that stand there and must not change.
     """
     folder, may_write = workspace.root, (*may_write, "cache")
     before, lines = _tree(folder), _whole_lines(folder)
@@ -96,15 +94,15 @@ def _ending_broken(ended: Done) -> Iterator[Broken]:
         last = ended.err.strip().splitlines() or ["?"]
         where = [line.strip() for line in last if line.lstrip().startswith('File "')]
         yield Broken(1, f"traceback of {last[-1][:60]} at {where[-1:]}", ended.err[-3000:])
-    elif ended.code not in CODES:
+    elif ended.code not in (0, 1, 2, 130):
         yield Broken(1, f"exit code {ended.code}", ended.err[-2000:])
-    elif ended.code == 2 and not any(word in ended.err for word in _COMPLAINTS):
+    elif ended.code == 2 and "error: " not in ended.err.lower():
         yield Broken(1, "exit code 2 without a message", ended.err[-2000:])
 
 
 def _judge(event: str, about: str, places: Sequence[str]) -> Iterator[Broken]:
     if event == "socket.connect":
-        if not any(name in about for name in _LOCAL):
+        if not any(name in about for name in ("127.0.0.1", "localhost", "::1")):
             yield Broken(2, "a connection", about)
     elif event == "os.mkdir" and any(_lies_in(place, [about]) for place in places):
         return  # that a folder above is there is found out by trying to make it
@@ -125,68 +123,6 @@ def _whole_lines(folder: Path) -> Counter[tuple[str, bytes]]:
                 if isinstance(json.loads(line), dict):
                     found[str(path.relative_to(folder)), line] += 1
     return found
-
-
-@dataclass(frozen=True)
-class Case:
-    """A command line and what stands in the folder where it is given: bytes in a file, a text that
-    a link points to, or None for a pipe that nobody writes to.
-
-    `may_write` are the paths that the command is to write in, beside cache and scratch folder;
-    `lasting` those of the user's files that stand there and must not change.
-    """
-
-    args: tuple[str, ...]
-    files: Mapping[str, bytes | str | None] = field(default_factory=dict)
-    may_write: tuple[str, ...] = ()
-    lasting: tuple[str, ...] = ()
-
-
-class Bench:
-    """Tries cases in a copy of the workspace `template`.
-
-    `tally` counts them by exit code, `found` has the laws that were broken, by kind.
-    """
-
-    def __init__(self, template: Workspace, folder: Path, tally: Counter[str]) -> None:
-        self._template, self._folder, self.tally = template, folder / "here", tally
-        self.found: dict[str, tuple[Case, Broken]] = {}
-
-    def try_out(self, case: Case) -> None:
-        """Note what the case broke; of cases that broke the same, the smallest is kept."""
-        made = self._template.copied(self._folder)
-        try:
-            (made.root / "tmp").mkdir()
-            made.env["TMPDIR"] = str(made.root / "tmp")
-            for name, content in case.files.items():
-                _put(made.root / name, content)
-            ended, found = watched(case.args, made, (*case.may_write, "tmp"), case.lasting)
-            self.tally["hangs" if ended.code is None else f"code {ended.code}"] += 1
-            for broken in found:
-                known = self.found.get(broken.name)
-                if known is None or len(repr(case)) < len(repr(known[0])):
-                    self.found[broken.name] = case, broken
-        finally:
-            shutil.rmtree(made.root)
-
-    def told(self) -> str:
-        """Every way in which a law was broken, with the smallest case that does it."""
-        lines = []
-        for name, (case, broken) in self.found.items():
-            parts = (f"{key}={value!r}"[:_LONGEST_SHOWN] for key, value in vars(case).items())
-            lines += ["", name, broken.detail, *parts]
-        return "\n".join(lines)
-
-
-def _put(path: Path, content: bytes | str | None) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.unlink(missing_ok=True)
-    if content is None:
-        os.mkfifo(path)
-    elif isinstance(content, str):
-        path.symlink_to(content)
-    else:
-        path.write_bytes(content)
 
 
 _COMES_TO = {
@@ -214,41 +150,33 @@ class Entry(NamedTuple):
         return self.model, self.sample
 
 
-class Ledger:
+class Ledger(list[Entry]):
     """The entries of a server in the order in which requests arrived."""
-
-    def __init__(self) -> None:
-        self.entries: list[Entry] = []
 
     @property
     def faults(self) -> Counter[str]:
         """Numbers of requests without an ordinary answer, by their end."""
-        return Counter(entry.ending for entry in self.entries if entry.ending != "ok")
+        return Counter(entry.ending for entry in self if entry.ending != "ok")
 
     def that_came_to(self, end: str) -> set[tuple[str, str]]:
         """Requests that ended so."""
-        return {entry.key for entry in self.entries if entry.comes_to == end}
+        return {entry.key for entry in self if entry.comes_to == end}
 
     def broken(self, folder: Path, *, retries_refused: bool = False) -> Iterator[Broken]:
-        """Yield what was asked again after it was answered or refused for good, and what was
-        answered and is not in a run.
-        """
+        """Yield what was asked again though it had ended for good, and replies that a run lost."""
         ended: dict[tuple[str, str], Entry] = {}
-        for entry in self.entries:
+        for entry in self:
             if entry.key in ended:
                 yield Broken(3, "asked twice", f"{ended[entry.key]}, then {entry}")
             if entry.comes_to == "reply" or (entry.comes_to == "sample" and not retries_refused):
                 ended[entry.key] = entry
         for lost in sorted(self.that_came_to("reply") - kept_in(folder)):
-            endings = [entry.ending for entry in self.entries if entry.key == lost]
+            endings = [entry.ending for entry in self if entry.key == lost]
             yield Broken(3, "a reply is lost", f"{lost}: {endings}")
 
 
 def kept_in(folder: Path) -> set[tuple[str, str]]:
-    """Return the entries of a run's records or calls, by model and signature of the reply.
-
-    A last line that a kill cut short does not count.
-    """
+    """Return the entries of a run's whole lines, by model and signature of the reply."""
     paths = (folder / name for name in _KEPT_FILES)
     lines = [one for p in paths if p.exists() for one in p.read_bytes().split(b"\n")[:-1]]
     stored = [one for one in map(json.loads, lines) if one.get("reply") is not None]
@@ -256,15 +184,12 @@ def kept_in(folder: Path) -> set[tuple[str, str]]:
 
 
 class LedgerChat(OpenAIChat):
-    """Answers every track; the digest of a request is its reply's reasoning.
-
-    Several that serve the same model may share a `ledger`.
-    """
+    """Answers every track; the digest of a request is its reply's reasoning."""
 
     def __init__(self, *args: Any, ledger: Ledger | None = None) -> None:
         super().__init__(*args, say=answered, think=lambda seen: seen.sample)
-        self.ledger = ledger or Ledger()
+        self.ledger = Ledger() if ledger is None else ledger
 
     async def _end(self, seen: Seen, ending: str, request: web.Request) -> web.StreamResponse:
-        self.ledger.entries.append(Entry(seen.model, seen.sample, ending))
+        self.ledger.append(Entry(seen.model, seen.sample, ending))
         return await super()._end(seen, ending, request)

@@ -31,9 +31,8 @@ KILLS = int(os.environ.get("PHYBLOCK_FUZZ_KILLS", "6"))
 
 
 def fuzzed(percent: float) -> Callable[[Any], Any]:
-    """Draw this share of all inputs for a test, the same ones for the same seed.
-
-    Nothing is shrunk: a command that hangs would be tried again and again.
+    """Draw this share of all inputs for a test, the same ones for the same seed. Nothing is shrunk:
+    a command that hangs would be tried again and again.
     """
     chosen = settings(
         max_examples=max(1, round(INPUTS * percent / 100)),
@@ -46,16 +45,17 @@ def fuzzed(percent: float) -> Callable[[Any], Any]:
     return lambda test: seed(SEED)(chosen(test))
 
 
-def documents(*keys: str, leaves: st.SearchStrategy[Any] | None = None) -> st.SearchStrategy[Any]:
+_VALUES = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5)
+
+
+def documents(*keys: str, leaves: st.SearchStrategy[Any] = _VALUES) -> st.SearchStrategy[Any]:
     """Documents of JSON whose objects have these keys; numbers may be infinite or none."""
-    usual = st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5)
-    return st.recursive(
-        usual if leaves is None else leaves,
-        lambda inner: (
-            st.lists(inner, max_size=3) | st.dictionaries(st.sampled_from(keys), inner, max_size=5)
-        ),
-        max_leaves=12,
-    )
+
+    def grown(inner: st.SearchStrategy[Any]) -> st.SearchStrategy[Any]:
+        objects = st.dictionaries(st.sampled_from(keys), inner, max_size=5)
+        return st.lists(inner, max_size=3) | objects
+
+    return st.recursive(leaves, grown, max_leaves=12)
 
 
 # Texts that stand in JSON or YAML where a value belongs; not all of them are JSON or YAML.

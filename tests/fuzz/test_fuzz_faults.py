@@ -16,43 +16,47 @@ from hypothesis import strategies as st
 from phyblock.errors import RetryableError, SampleError
 from phyblock.models.costs import Budget
 from phyblock.records.record import Reply
-from tests.fuzz.laws import LedgerChat, watched
-from tests.fuzz.strategies import FAULTS as NUMBER
-from tests.fuzz.strategies import SEED, fuzzed
-from tests.models.factory import (
-    QUICK,
-    ROUTES,
-    Disk,
-    Killing,
-    command,
-    look_up,
-    requests_of,
-    run_command,
-)
+from tests.fuzz.laws import TRACKS, LedgerChat, watched
+from tests.fuzz.strategies import FAULTS, SEED, fuzzed
+from tests.models import factory
+from tests.models.factory import ROUTES, Disk, Killing, command, requests_of, run_command
 from tests.servers.batches import AnthropicBatches, BatchFaults, GeminiBatches, OpenAIBatches
-from tests.servers.chassis import FAULTS, Faults, Running
+from tests.servers.chassis import Faults, Running
 from tests.servers.faults import WIRE_FAULTS
 from tests.servers.openai_chat import OpenAIChat
-from tests.workspace import PRICE, SCENES, questions, read_lines, vqa_suite, write_questions
+from tests.workspace import PRICE, SCENES, questions, read_lines, write_questions
 
 pytestmark = pytest.mark.fuzz
 
 _SHARE = 0.35
-_TRACKS = {
-    "full_planning": (5, {}),
-    "vqa": (12, vqa_suite(subtasks=["SH", "OR", "VP"])),
-    "step_planning": (15, {"tracks": ["step_planning"], "steps": {"physics": "off"}}),
-}
-"""By track: at least how many requests a seed makes, and the suite."""
 _TRANSPORTS = ("direct", "litellm")
 _CELLS = [
     pytest.param(track, transport, marks=[] if n == 0 else [pytest.mark.slow])
-    for n, (track, transport) in enumerate((t, w) for w in _TRANSPORTS for t in _TRACKS)
+    for n, (track, transport) in enumerate((t, w) for w in _TRANSPORTS for t in TRACKS)
 ]
 _STOPPING = [name for name, fault in WIRE_FAULTS.items() if fault.ending == "unavailable"]
-_PASSING = [*FAULTS, "400", *(name for name in WIRE_FAULTS if name not in _STOPPING)]
-_QUOTA = math.ceil(NUMBER / len(_CELLS))
+_PASSING = ["429", "500", "empty", "400", *(n for n in WIRE_FAULTS if n not in _STOPPING)]
+_QUOTA = math.ceil(FAULTS / len(_CELLS))
 """Faults that each track meets over each transport."""
+WAYS = [
+    (OpenAIBatches, "direct"),
+    pytest.param(AnthropicBatches, "anthropic", marks=pytest.mark.slow),
+    pytest.param(GeminiBatches, "gemini", marks=pytest.mark.slow),
+]
+ASKED = 4
+COMMANDS = 25
+WHOLE = ("ok", "twice", "stranger")
+endings = st.sampled_from([*WHOLE, "500", "429", "400", "length", "missing", "broken", "expired"])
+failures = st.lists(st.sampled_from(["", "500", "reset", "done-reset"]), max_size=3).map(tuple)
+lines = st.dictionaries(st.integers(0, ASKED - 1), endings, max_size=ASKED)
+batch_faults = st.builds(
+    BatchFaults,
+    st.dictionaries(st.integers(0, 3), lines),
+    st.dictionaries(st.integers(0, 1), st.sampled_from(["refused", "cancelled"]), max_size=1),
+    st.fixed_dictionaries(dict.fromkeys(("upload", "create", "look", "results"), failures)),
+    looks=st.integers(1, 3),
+)
+"""Faults of four batches, one of which may be cancelled or refused, and of calls about them."""
 
 
 def prepare(workspace, url, track, transport, seeds):
@@ -62,8 +66,7 @@ def prepare(workspace, url, track, transport, seeds):
         fields["api_base"] = [f"{one}/v1" for one in (url, url.replace("127.0.0.1", "localhost"))]
     workspace.write_models(url, "alpha", **fields)
     limits = {"max_concurrency": 24, "timeout_s": 20.0}
-    asked = {"models": ["alpha"], "seeds": seeds, "limits": limits}
-    workspace.write_suite(**{"images": {"size_px": 128}, **_TRACKS[track][1], **asked})
+    workspace.write_suite(models=["alpha"], seeds=seeds, limits=limits, **TRACKS[track][1])
 
 
 def run(workspace, *args):
@@ -82,39 +85,40 @@ def holds(broken):
 def one_round(workspace, server, track):
     """A run with faults to its end, the same again, what was refused again, and a second run."""
     ledger = server.ledger
-    first = len(ledger.entries)
+    first = len(ledger)
     for _ in range(10):
         done = run(workspace)
         if "To continue" not in done.out:
             break
-    asked = len(ledger.entries)
+    asked = len(ledger)
     assert run(workspace).code == (1 if ledger.that_came_to("sample") else 0), done.out + done.err
-    assert len(ledger.entries) == asked, "a run that was done asked again"
+    assert len(ledger) == asked, "a run that was done asked again"
     holds(ledger.broken(workspace.out))
 
     server.faults = Faults()
-    refused = {entry.key for entry in ledger.entries[first:] if entry.comes_to == "sample"}
+    refused = {entry.key for entry in ledger[first:] if entry.comes_to == "sample"}
     done = run(workspace, "--retry-failed")
     assert done.code == 0, done.out + done.err
-    again = ledger.entries[asked:]
+    again = ledger[asked:]
     if track != "step_planning":  # where an episode goes on with turns that were never asked
         assert Counter(entry.key for entry in again) == Counter(refused)
     holds(ledger.broken(workspace.out, retries_refused=True))
 
-    asked = len(ledger.entries)
+    asked = len(ledger)
     workspace.out = workspace.out.with_name(f"{workspace.out.name}-again")
     done = run(workspace)
     assert done.code == 0, done.out + done.err
-    assert len(ledger.entries) == asked, "what stands in the cache was asked again"
+    assert len(ledger) == asked, "what stands in the cache was asked again"
 
 
 @pytest.mark.parametrize(("track", "transport"), _CELLS)
 def test_faults(workspace, tallies, track, transport):
-    seeds = math.ceil(_QUOTA * (1 - _SHARE) / _SHARE / _TRACKS[track][0]) + 1
+    seeds = math.ceil(_QUOTA * (1 - _SHARE) / _SHARE / TRACKS[track][0]) + 1
     met = Counter()
     n = 0
     while sum(met.values()) < _QUOTA:
-        faults = Faults.spread(_PASSING, _SHARE, seed=1 + SEED + n, retry_after="0")
+        shares = dict.fromkeys(_PASSING, _SHARE / len(_PASSING))
+        faults = Faults(shares, seed=1 + SEED + n, retry_after="0")
         server = LedgerChat(faults)
         with Running(server) as running:
             workspace.out = workspace.root / f"out{n}"
@@ -129,7 +133,7 @@ def test_faults(workspace, tallies, track, transport):
 @pytest.mark.slow
 @pytest.mark.parametrize("transport", _TRANSPORTS)
 def test_faults_that_stop_a_model(workspace, tallies, transport):
-    faults = Faults.spread(_STOPPING, 0.5, seed=1 + SEED)
+    faults = Faults(dict.fromkeys(_STOPPING, 0.5 / len(_STOPPING)), seed=1 + SEED)
     with Running(LedgerChat(faults)) as running:
         server = running.server
         prepare(workspace, running.url, "full_planning", transport, list(range(8)))
@@ -143,27 +147,6 @@ def test_faults_that_stop_a_model(workspace, tallies, transport):
     tallies.setdefault(f"faults that stop, {transport}", Counter()).update(server.ledger.faults)
 
 
-ASKED = 4
-COMMANDS = 25
-WAYS = [
-    (OpenAIBatches, "direct"),
-    pytest.param(AnthropicBatches, "anthropic", marks=pytest.mark.slow),
-    pytest.param(GeminiBatches, "gemini", marks=pytest.mark.slow),
-]
-WHOLE = ("ok", "twice", "stranger")
-endings = st.sampled_from([*WHOLE, "500", "429", "400", "length", "missing", "broken", "expired"])
-failures = st.lists(st.sampled_from(["", "500", "reset", "done-reset"]), max_size=3).map(tuple)
-lines = st.dictionaries(st.integers(0, ASKED - 1), endings, max_size=ASKED)
-batch_faults = st.builds(
-    BatchFaults,
-    st.dictionaries(st.integers(0, 3), lines),
-    st.dictionaries(st.integers(0, 1), st.sampled_from(["refused", "cancelled"]), max_size=1),
-    st.fixed_dictionaries(dict.fromkeys(("upload", "create", "look", "results"), failures)),
-    looks=st.integers(1, 3),
-)
-"""Faults of four batches, one of which may be cancelled or refused, and of calls about them."""
-
-
 # What a kill cuts off in litellm is closed when it is collected.
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 @pytest.mark.parametrize(("kind", "route"), WAYS)
@@ -171,7 +154,7 @@ batch_faults = st.builds(
 @given(batch_faults, st.lists(st.integers(0, 25), max_size=3))
 def test_batches(kind, route, faults, kills):
     requests = requests_of(ASKED)
-    policy = replace(QUICK, attempts=3)
+    policy = replace(factory.QUICK, attempts=3)
     with tempfile.TemporaryDirectory() as folder, Running(kind(batch=faults)) as running:
         server = running.server
         config = ROUTES[route].config(running.url, batch=True, price={"input": 1.0, "output": 1.0})
@@ -187,7 +170,7 @@ def test_batches(kind, route, faults, kills):
             if all(isinstance(one, (Reply, SampleError)) for one in ended):
                 break
             if unsure := [str(one) for one in ended if "is not known whether" in str(one)]:
-                disk.lines = look_up(server, disk.lines, unsure[0])
+                disk.lines = factory.look_up(server, disk.lines, unsure[0])
         else:
             raise AssertionError(f"no end after {COMMANDS} commands: {ended}")
         answered = Counter()
@@ -199,7 +182,7 @@ def test_batches(kind, route, faults, kills):
         assert set(answered.values()) == {1}, answered
 
 
-@pytest.mark.parametrize("number", range(-(-NUMBER // 40)))
+@pytest.mark.parametrize("number", range(-(-FAULTS // 40)))
 def test_no_more_is_spent_than_the_limit_and_what_was_under_way(workspace, tallies, number):
     draw = random.Random(f"{SEED} costs {number}")
     limit = 10 ** draw.uniform(-1, 2)

@@ -3,12 +3,9 @@ models in batches without a run around them: a list for the disk, and kills.
 """
 
 import asyncio
-import itertools
 import re
 import threading
-import time
-from collections.abc import Callable, Collection, Coroutine, Sequence
-from contextlib import nullcontext
+from collections.abc import Callable, Coroutine, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -17,16 +14,15 @@ from phyblock.config.models import ModelConfig
 from phyblock.domain.scene import Block, Candidate, CandidateSet, Scene
 from phyblock.errors import BudgetReachedError, ModelError
 from phyblock.models.batch import BatchFiles
-from phyblock.models.cache import ReplyCache
 from phyblock.models.model import ModelEvent, RetryPolicy, build_model
 from phyblock.models.request import Image, Message, Model, Request
-from phyblock.records.record import BatchLine, Reply
+from phyblock.records.record import BatchLine
 from phyblock.tracks.full_planning import PlanSubject
 from tests.servers.batches import BatchServer
 from tests.servers.chassis import LocalServer
 from tests.servers.openai_chat import OpenAIChat
 from tests.servers.other_protocols import AnthropicMessages, GeminiGenerate
-from tests.workspace import KEY_VARIABLE
+from tests.workspace import KEY_VARIABLE, until
 
 
 @dataclass(frozen=True)
@@ -38,10 +34,11 @@ class Route:
     path: str
     transport: str
 
-    def config(self, url: str, **fields: Any) -> ModelConfig:
-        """A model at the server with this address, its key in `KEY_VARIABLE`."""
+    def config(self, *urls: str, **fields: Any) -> ModelConfig:
+        """A model at the server or servers with these addresses, its key in `KEY_VARIABLE`."""
         known: dict[str, Any] = {"id": self.model_id, "transport": self.transport, **fields}
-        base = url + self.path
+        first, *others = (url + self.path for url in urls)
+        base = (first, *others) if others else first
         return ModelConfig(name="m", api_base=base, api_key_env=KEY_VARIABLE, **known)
 
 
@@ -113,22 +110,17 @@ def requests_of(count: int) -> list[Request]:
 
 
 def make_model(
-    config: ModelConfig,
-    *,
-    cache: ReplyCache | None = None,
-    events: list[ModelEvent] | None = None,
-    policy: RetryPolicy = QUICK,
-    **options: Any,
+    config: ModelConfig, *, events: list[ModelEvent] | None = None, **options: Any
 ) -> Model:
-    """A model with quick retries; its events go into the list."""
+    """A model with quick retries and no cache; its events go into the list."""
     report = (events if events is not None else []).append
-    return build_model(config, cache=cache, report=report, policy=policy, **options)
+    return build_model(config, **{"cache": None, "policy": QUICK, "report": report} | options)
 
 
 async def answers(model: Model, *requests: Request) -> list[Any]:
     """Ask all at once and close the model; errors and what stops it stand among the replies."""
 
-    async def one(request: Request) -> Reply | ModelError | BudgetReachedError | None:
+    async def one(request: Request) -> Any:
         try:
             return await model.ask(request)
         except (ModelError, BudgetReachedError) as error:
@@ -149,10 +141,9 @@ POLL_S = 0.01
 
 @dataclass
 class Disk:
-    """The remains of a killed process: lines about batches, a folder, perhaps a cache."""
+    """The remains of a killed process: lines about batches, and a folder."""
 
     folder: Path
-    cache: Path | None = None
     lines: list[BatchLine] = field(default_factory=list)
     moment: Callable[[str], Any] | None = None
 
@@ -165,22 +156,18 @@ class Disk:
         if self.moment is not None:
             await self.moment(f"after {line.event}")
 
-    def files(self, recorded: Collection[str], expected: int) -> BatchFiles:
-        return BatchFiles(tuple(self.lines), self.put, self.folder, POLL_S, recorded, expected)
-
 
 async def command(
     config: ModelConfig,
     disk: Disk,
     requests: Sequence[Request],
-    *,
     recorded: Sequence[Request] = (),
     **options: Any,
 ) -> list[Any]:
     """Ask all at once, as one command does."""
-    with nullcontext() if disk.cache is None else ReplyCache(disk.cache) as cache:
-        files = disk.files({one.sample for one in recorded}, len(requests))
-        ended = await answers(make_model(config, cache=cache, batches=files, **options), *requests)
+    known = {one.sample for one in recorded}
+    files = BatchFiles(tuple(disk.lines), disk.put, disk.folder, POLL_S, known, len(requests))
+    ended = await answers(make_model(config, batches=files, **options), *requests)
     # Or others would wait for it.
     assert options.get("budget") is None or not options["budget"].holds
     return ended
@@ -191,12 +178,8 @@ def run_command(*args: Any, **options: Any) -> list[Any]:
 
 
 def look_up(server: BatchServer, lines: list[BatchLine], error: str) -> list[BatchLine]:
-    """Return the lines as the error of a batch that may exist tells a person to change them.
-
-    A person comes later: the server has finished its calls.
-    """
-    while server.under_way:
-        time.sleep(0.001)
+    """Return the lines as a person changes them later, whom the error of a batch tells how."""
+    until(lambda: not server.under_way)
     found = re.search(r"\{.*?\}", error)
     assert found is not None, error
     line = BatchLine.model_validate_json(found[0])
@@ -211,8 +194,6 @@ class Killing:
     def __init__(self, at: int) -> None:
         self.at = at
         self.names: list[str] = []
-        self._count = itertools.count()
-        self._loop: asyncio.AbstractEventLoop | None = None
         self._killed, self._over = asyncio.Event(), threading.Event()
 
     def run(self, disk: Disk, server: BatchServer, work: Coroutine[Any, Any, Any]) -> bool:
@@ -237,7 +218,7 @@ class Killing:
 
     def _is_now(self, name: str) -> bool:
         self.names.append(name)
-        return next(self._count) == self.at
+        return len(self.names) == self.at + 1
 
     async def _here(self, name: str) -> None:
         """A moment on the client's side."""

@@ -19,26 +19,28 @@ from phyblock.models.costs import Budget
 from phyblock.records.record import BatchLine, Reply
 from tests.fuzz.strategies import documents
 from tests.models import factory
-from tests.models.factory import (
-    QUICK,
-    ROUTES,
-    Disk,
-    Killing,
-    ask,
-    command,
-    look_up,
-    make_model,
-    make_request,
-    requests_of,
-    run_command,
-    with_fields,
-)
+from tests.models.factory import Disk, ask, make_model, requests_of, run_command, with_fields
 from tests.servers.batches import AnthropicBatches, BatchFaults, GeminiBatches, OpenAIBatches
 from tests.servers.chassis import Running
 from tests.workspace import KEY
 
 SERVERS = {"direct": OpenAIBatches, "anthropic": AnthropicBatches, "gemini": GeminiBatches}
 PRICE = {"input": 1000, "output": 1000, "batch": {"input": 500, "output": 500}}
+TOKEN = "pb0"
+keys = st.lists(st.sampled_from("abcdef"), unique=True, min_size=1)
+fates = st.sampled_from(["intended", "created", "lost", "ended"])
+values = st.none() | st.integers() | st.text()
+DOCUMENTS = documents(
+    *("id", "name", "status", "processing_status", "request_counts", "total", "metadata", "state"),
+    *("batchStats", "requestCount", "response", "output", "responsesFile", "error", "code", "body"),
+    *("custom_id", "key", "result", "type", "message", "status_code", "created_at", "createTime"),
+    *("data", "has_more", "operations", "nextPageToken", "errors", "output_file_id"),
+    leaves=values | st.booleans() | st.floats() | st.just("2026-11-23T10:00:00Z"),
+)
+# Names of requests of this and of other batches.
+names = st.integers(0, 5).map(lambda n: custom_id(Batch(TOKEN), n)) | st.sampled_from(
+    ["pb0-x", "pb0--1", "pb01-1", "pb0-1-1", "pb0-", "-", "", "pb0-٣", "pb0-99999999999"]
+)
 
 
 @pytest.fixture(params=SERVERS)
@@ -51,15 +53,11 @@ def disk(tmp_path):
     return Disk(tmp_path)
 
 
-def config_at(route, url, **fields):
-    return ROUTES[route].config(url, batch=True, price=PRICE, **fields)
-
-
 @contextlib.contextmanager
 def serving(route, faults=None, kind=None):
     """A server of batches, and a model there."""
-    with Running((kind or SERVERS[route])(batch=faults)) as running:
-        yield running.server, config_at(route, running.url)
+    with Running((kind or SERVERS[route])(batch=faults or BatchFaults())) as running:
+        yield running.server, factory.ROUTES[route].config(running.url, batch=True, price=PRICE)
 
 
 def served(route, disk, requests, faults=None, **options):
@@ -68,13 +66,10 @@ def served(route, disk, requests, faults=None, **options):
         return server, run_command(config, disk, requests, **options)
 
 
-def texts(ended):
+def all_once(server, ended):
+    """Every request has its reply, and was asked once."""
     assert {type(one) for one in ended} == {Reply}, ended
-    return [one.text for one in ended]
-
-
-def once(server, count):
-    return len(server.asked) == count and set(server.asked.values()) == {1}
+    assert (len(server.asked), set(server.asked.values())) == (len(ended), {1})
 
 
 def test_a_batch_asks_and_answers_as_single_calls_do(route, disk):
@@ -92,7 +87,7 @@ def test_a_batch_asks_and_answers_as_single_calls_do(route, disk):
             alike = {"batched": False, "latency_s": 0.0, "cost_usd": None, "billed_usd": None}
             assert one.model_copy(update=alike) == other.model_copy(update=alike)
     assert server.keys == {KEY}
-    assert once(server, 3)
+    all_once(server, ended)
 
 
 FAULTS = {
@@ -112,7 +107,8 @@ def test_each_line_that_fails_is_asked_again_or_ends_as_a_call_would(route, disk
         assert Counter(map(type, ended)) == {Reply: 3, RetryableError: 5, SampleError: 1}
         ended = run_command(config, disk, requests, recorded=requests[:-2])
         # What was rejected is asked again only when that is wanted.
-        assert len(texts(run_command(config, disk, requests[-2:-1], recorded=requests))) == 1
+        (mended,) = run_command(config, disk, requests[-2:-1], recorded=requests)
+        assert isinstance(mended, Reply)
     samples = [one.sample for one in server.seen[: len(requests)]]
     for sample, one, (again, kind) in zip(samples, ended, FAULTS.values(), strict=False):
         assert isinstance(one, kind), (one, kind)
@@ -134,8 +130,7 @@ def test_a_batch_that_is_ended_keeps_its_answers_and_the_rest_is_asked_again(rou
         assert len(server.made) == 1
         paid = sum(one.cost_usd for one in ended if isinstance(one, Reply))
         assert budget.spent_usd == pytest.approx(paid)
-        assert len(texts(run_command(config, disk, requests, recorded=requests))) == 4
-    assert once(server, 4)
+        all_once(server, run_command(config, disk, requests, recorded=requests))
     assert [len(made.requests) for made in server.made] == [4, len(places)]
 
 
@@ -143,11 +138,10 @@ def test_a_refused_batch_stops_the_model_and_asks_nothing(disk):
     requests = requests_of(2)
     with serving("direct", BatchFaults(ends={0: "refused"})) as (server, config):
         ended = run_command(config, disk, requests, budget=Budget(1e9))
-        assert isinstance(ended[0], UnavailableError)
+        assert {type(one) for one in ended} == {UnavailableError}
         assert "Enqueued token limit" in str(ended[0])
         assert disk.lines[-1].event == "lost"
-        assert len(texts(run_command(config, disk, requests))) == 2
-    assert once(server, 2)
+        all_once(server, run_command(config, disk, requests))
 
 
 STOPS = UnavailableError
@@ -167,16 +161,15 @@ CALLS = {
 
 @pytest.mark.parametrize(("calls", "kind"), CALLS.values(), ids=list(CALLS))
 def test_calls_that_fail_lose_nothing_and_the_next_command_goes_on(route, disk, calls, kind):
-    policy = replace(QUICK, attempts=4)
+    policy = replace(factory.QUICK, attempts=4)
     requests, budget = requests_of(2), Budget(1e9)
     with serving(route, BatchFaults(calls=calls)) as (server, config):
         ended = run_command(config, disk, requests, policy=policy, budget=budget)
         assert {type(one) for one in ended} == {kind}
         assert KEY not in str(ended) + "".join(line.as_json() for line in disk.lines)
         assert server.made == [] or budget.spent_usd > 0
-        server.batch_faults = BatchFaults()
-        assert len(texts(run_command(config, disk, requests))) == 2
-    assert once(server, 2)
+        server.batch = BatchFaults()
+        all_once(server, run_command(config, disk, requests))
 
 
 UNSURE = {
@@ -190,16 +183,13 @@ UNSURE = {
 def test_a_batch_that_may_exist_stops_the_model_until_it_is_looked_up(route, disk, faults, made):
     requests = requests_of(2)
     with serving(route, BatchFaults(calls={"create": faults})) as (server, config):
-        for _ in range(2):
-            budget = Budget(1e9)
+        for budget in (Budget(1e9), Budget(1e9)):
             ended = run_command(config, disk, requests, budget=budget)
             assert {type(one) for one in ended} == {UnavailableError}
             assert "it is not known whether batch pb" in str(ended[0])
-            assert len(server.made) == made
-            assert budget.spent_usd > 0
-        disk.lines = look_up(server, disk.lines, str(ended[0]))
-        assert len(texts(run_command(config, disk, requests))) == 2
-    assert once(server, 2)
+            assert (len(server.made), budget.spent_usd > 0) == (made, True)
+        disk.lines = factory.look_up(server, disk.lines, str(ended[0]))
+        all_once(server, run_command(config, disk, requests))
     assert len(server.made) == 1
 
 
@@ -223,13 +213,12 @@ def test_once_a_model_is_stopped_its_draft_is_not_sent_and_costs_nothing(disk, m
     ],
 )
 def test_what_does_not_fit_goes_out_in_further_batches(route, disk, monkeypatch, limit, most, size):
-    config = config_at(route, "http://localhost:9")
-    monkeypatch.setattr(PROVIDERS[config.provider], limit, most)
+    provider, _, _ = factory.ROUTES[route].model_id.partition("/")
+    monkeypatch.setattr(PROVIDERS[provider], limit, most)
     server, ended = served(route, disk, requests_of(5))
-    assert len(texts(ended)) == 5
     assert 1 < len(server.made) < 5
     assert max(size(made.requests) for made in server.made) <= most
-    assert once(server, 5)
+    all_once(server, ended)
 
 
 @pytest.mark.parametrize(("shares", "first"), [(2.5, 2), (0.5, 0)])
@@ -251,15 +240,15 @@ def test_a_cost_limit_is_kept_by_the_dearest_case_of_what_is_sent(disk, shares, 
 
 def test_what_is_in_the_cache_is_not_asked_and_answers_go_there(route, tmp_path):
     """Batched or not, it is the same question; what it cost is what it was asked for as."""
-    cache = tmp_path / "replies.sqlite"
     requests = requests_of(2)
-    disk = Disk(tmp_path, cache)
-    server, (first,) = served(route, disk, requests[:1])
-    with serving(route) as (_, config), ReplyCache(cache) as kept:
-        found, single = ask(make_model(with_fields(config, batch=False), cache=kept), *requests)
+    with ReplyCache(tmp_path / "replies.sqlite") as cache:
+        server, (first,) = served(route, Disk(tmp_path), requests[:1], cache=cache)
+        with serving(route) as (_, config):
+            model = make_model(with_fields(config, batch=False), cache=cache)
+            found, single = ask(model, *requests)
+        server, ended = served(route, Disk(tmp_path / "other"), requests, cache=cache)
     assert (found.cached, found.batched, found.cost_usd) == (True, True, first.cost_usd)
     assert (single.cached, single.batched) == (False, False)
-    server, ended = served(route, Disk(tmp_path / "other", cache), requests)
     assert not server.calls
     assert [one.cost_usd for one in ended] == [first.cost_usd, single.cost_usd]
 
@@ -270,32 +259,18 @@ def test_a_kill_at_any_moment_loses_nothing_and_asks_nothing_twice(route, tmp_pa
     requests = requests_of(2)
     for at in itertools.count():
         disk = Disk(tmp_path / str(at))
-        killing = Killing(at)
+        killing = factory.Killing(at)
         with serving(route) as (server, config):
-            is_over = killing.run(disk, server, command(config, disk, requests))
+            is_over = killing.run(disk, server, factory.command(config, disk, requests))
             again = run_command(config, disk, requests, budget=Budget(1e9))
             if "is not known whether" in str(again[0]):
-                disk.lines = look_up(server, disk.lines, str(again[0]))
+                disk.lines = factory.look_up(server, disk.lines, str(again[0]))
                 again = run_command(config, disk, requests, budget=Budget(1e9))
-            assert len(texts(again)) == 2
-        assert once(server, 2), killing.names[at]
+            all_once(server, again)
         if is_over:
             break
         assert len(server.made) == 1, killing.names[at]
     assert at >= 14
-
-
-TOKEN = "pb0"
-keys = st.lists(st.sampled_from("abcdef"), unique=True, min_size=1)
-fates = st.sampled_from(["intended", "created", "lost", "ended"])
-values = st.none() | st.integers() | st.text()
-DOCUMENTS = documents(
-    *("id", "name", "status", "processing_status", "request_counts", "total", "metadata", "state"),
-    *("batchStats", "requestCount", "response", "output", "responsesFile", "error", "code", "body"),
-    *("custom_id", "key", "result", "type", "message", "status_code", "created_at", "createTime"),
-    *("data", "has_more", "operations", "nextPageToken", "errors", "output_file_id"),
-    leaves=values | st.booleans() | st.floats() | st.just("2026-11-23T10:00:00Z"),
-)
 
 
 @given(st.lists(st.tuples(keys, fates)))
@@ -319,12 +294,6 @@ def test_a_request_is_in_the_last_batch_that_was_not_lost(batches):
     assert read_batches(lines, "another") == []
     waits = [f"t{n}" for n in left if batches[n][1] != "ended"]
     assert [one.token for one in under_way(lines, "m")] == waits
-
-
-# Names of requests of this and of other batches.
-names = st.integers(0, 5).map(lambda n: custom_id(Batch(TOKEN), n)) | st.sampled_from(
-    ["pb0-x", "pb0--1", "pb01-1", "pb0-1-1", "pb0-", "-", "", "pb0-٣", "pb0-99999999999"]
-)
 
 
 @given(st.lists(st.tuples(names, st.booleans())), st.integers(0, 4))
@@ -365,11 +334,11 @@ def test_bodies_stand_in_lines_as_they_are(fields, name, body):
 def test_results_that_are_not_there_yet_are_not_taken_for_none(disk):
     class Late(OpenAIBatches):
         def told(self, made):
-            is_early = made.looks <= self.batch_faults.looks
+            is_early = made.looks <= self.batch.looks
             return {**super().told(made), **({"output_file_id": None} if is_early else {})}
 
     with serving("direct", kind=Late) as (server, config):
-        assert len(texts(run_command(config, disk, requests_of(2)))) == 2
+        all_once(server, run_command(config, disk, requests_of(2)))
     assert len(server.made) == 1
 
 
@@ -385,7 +354,7 @@ def test_headers_that_requests_need_go_with_their_batch(disk):
 
     fields = {"id": "anthropic/claude-sonnet-4-5", "response_format": "always"}
     with serving("anthropic", kind=Noting) as (_, config):
-        request = replace(make_request(), response_format=form)
+        request = replace(factory.make_request(), response_format=form)
         (reply,) = run_command(with_fields(config, **fields), disk, [request])
     assert isinstance(reply, Reply)
     (beta,) = betas.pop("create")

@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
@@ -9,36 +10,26 @@ from hypothesis import strategies as st
 
 from phyblock.config.models import ModelConfig, Price, Tariff
 from phyblock.errors import BudgetReachedError, RetryableError, UnavailableError
+from phyblock.models import costs
 from phyblock.models.cache import ReplyCache
-from phyblock.models.costs import (
-    Budget,
-    Estimate,
-    ModelBudget,
-    cost_usd,
-    estimate,
-    is_billed,
-    map_entry,
-    most_usd,
-    picture_tokens,
-    price_at,
-    tariff_of,
-)
-from phyblock.models.request import Image, Message, Request
+from phyblock.models.costs import Budget, Estimate, ModelBudget, cost_usd, estimate, most_usd
+from phyblock.models.request import Image, Message
 from phyblock.records.record import Reply, Usage
-from phyblock.tracks.full_planning import PlanSubject
-from tests.models.factory import (
-    CANDIDATES,
-    ROUTES,
-    SCENE,
-    ask,
-    make_model,
-    make_request,
-    requests_of,
-    with_fields,
-)
+from tests.models.factory import ROUTES, ask, make_model, make_request, requests_of, with_fields
 from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import PRICE, in_a_loop
+
+sides = st.integers(1, 6000)
+FAMILIES = ("gpt-4o", "gpt-5.6", "claude-opus-4-7", "claude-3", "gemini-2.5", "grok-4")
+A_MILLIONTH = Tariff(input=0.0, output=1.0)
+"""The price of a token of a reply, so that a call costs any number of them."""
+steps = st.tuples(st.integers(10_000, 3_000_000), st.floats(0, 1), st.integers(0, 3))
+told_tokens = st.tuples(st.integers(1, 90_000), st.integers(1, 9000))
+amounts = st.one_of(st.none(), st.floats(), st.floats(0, 2))
+usd = st.floats(0, 100)
+maybe = st.none() | usd
+prices = st.builds(Price, input=usd, output=usd, cached=maybe, cache_write=maybe)
 
 
 def config(model_id, **fields):
@@ -46,7 +37,7 @@ def config(model_id, **fields):
 
 
 def request_of(*parts, **params):
-    return Request("0", 0, (Message("user", parts),), params, "v", PlanSubject(SCENE, CANDIDATES))
+    return replace(make_request(), messages=(Message("user", parts),), params=params)
 
 
 PICTURES = """
@@ -86,15 +77,11 @@ def test_a_picture_counts_as_its_model_counts_it():
         assert estimate(asked, request_of(image)).prompt_tokens == int(tokens), model
 
 
-sides = st.integers(1, 6000)
-FAMILIES = ("gpt-4o", "gpt-5.6", "claude-opus-4-7", "claude-3", "gemini-2.5", "grok-4")
-
-
 @given(st.sampled_from(FAMILIES), sides, sides)
 def test_every_picture_counts_and_none_without_bound(model, width, height):
-    tokens = picture_tokens(f"x/{model}", Image(b"", "goal", width, height))
+    tokens = costs.picture_tokens(f"x/{model}", Image(b"", "goal", width, height))
     assert 1 <= tokens <= 36_000
-    assert tokens == picture_tokens(f"x/{model}", Image(b"", "goal", height, width))
+    assert tokens == costs.picture_tokens(f"x/{model}", Image(b"", "goal", height, width))
 
 
 @pytest.mark.parametrize(
@@ -116,17 +103,10 @@ def test_a_reply_is_as_long_as_the_model_thinks_and_may_say(model_id, params, us
 def test_a_local_server_is_free_only_where_no_key_is_sent(monkeypatch):
     monkeypatch.delenv("HOSTED_VLLM_API_KEY", raising=False)
     local = config("hosted_vllm/x", api_base="http://127.0.0.1:9/v1")
-    assert not is_billed(local)
+    assert not costs.is_billed(local)
     monkeypatch.setenv("HOSTED_VLLM_API_KEY", "sk-not-a-real-key-1234")
-    assert is_billed(local)
-    assert is_billed(config("openai/nobodys"))
-
-
-A_MILLIONTH = Tariff(input=0.0, output=1.0)
-"""The price of a token of a reply, so that a call costs any number of them."""
-
-
-steps = st.tuples(st.integers(10_000, 3_000_000), st.floats(0, 1), st.integers(0, 3))
+    assert costs.is_billed(local)
+    assert costs.is_billed(config("openai/nobodys"))
 
 
 @given(st.floats(0.1, 10), st.lists(steps, max_size=30))
@@ -134,14 +114,12 @@ steps = st.tuples(st.integers(10_000, 3_000_000), st.floats(0, 1), st.integers(0
 async def test_a_budget_is_never_passed_and_stops_only_when_nothing_more_fits(limit, calls):
     budget = Budget(limit)
     own = ModelBudget(budget, A_MILLIONTH)
-    refused = []
 
     async def call(tokens, share, steps):
         most = tokens / 1e6
         try:
             held = await own.reserve(Estimate(0, 0, tokens))
         except BudgetReachedError:
-            refused.append(most)
             assert budget.spent_usd + most > limit
             return
         for _ in range(steps):
@@ -153,15 +131,11 @@ async def test_a_budget_is_never_passed_and_stops_only_when_nothing_more_fits(li
     assert budget.spent_usd <= limit + 1e-9
 
 
-told_tokens = st.tuples(st.integers(1, 90_000), st.integers(1, 9000))
-
-
 @given(st.floats(0.01, 5), st.lists(told_tokens, min_size=1, max_size=40), st.integers(1, 16))
 @in_a_loop
 async def test_a_call_costs_no_more_than_was_held_once_a_reply_like_it_has_come(limit, told, width):
-    """Whatever a server counts, the limit is passed at most by calls that were under way then.
-
-    The first call is alone, and never are more under way than one more than were answered.
+    """Whatever a server counts, the limit is passed at most by calls that were under way then; the
+    first call is alone, and never are more under way than one more than were answered.
     """
     expected, budget, room = Estimate(1000, 100, 100), Budget(limit), asyncio.Semaphore(width)
     own = ModelBudget(budget, Tariff(**PRICE))
@@ -190,9 +164,6 @@ async def test_a_call_costs_no_more_than_was_held_once_a_reply_like_it_has_come(
             assert budget.spent_usd <= limit + over_usd + 1e-9
 
     await asyncio.gather(*map(call, told))
-
-
-amounts = st.one_of(st.none(), st.floats(), st.floats(0, 2))
 
 
 @given(st.lists(st.tuples(st.integers(10_000, 2_000_000), amounts), max_size=30))
@@ -269,11 +240,6 @@ def test_a_reply_says_what_the_limit_counts_for_all_its_attempts(tmp_path):
     assert {reply.billed_usd for reply in again} == {None}
 
 
-usd = st.floats(0, 100)
-maybe = st.none() | usd
-prices = st.builds(Price, input=usd, output=usd, cached=maybe, cache_write=maybe)
-
-
 @given(prices, *[st.integers(0, 10**6)] * 3, st.integers(0, 10**9))
 def test_each_prompt_token_is_paid_once(price, fresh, cached, written, out):
     usage = Usage(
@@ -315,13 +281,13 @@ def test_batches_cost_half_only_where_that_is_known(model_id, api_base, is_half)
     whole = {"input": 8.0, "output": 40.0, "cached": 1.0}
     half = {name: usd / 2 for name, usd in whole.items()}
     served = config(model_id, batch=True, api_base=api_base)
-    known = tariff_of(with_fields(served, price=whole))
-    found = price_at(known, batched=True)
+    known = costs.tariff_of(with_fields(served, price=whole))
+    found = costs.price_at(known, batched=True)
     assert found.model_dump(include=set(whole)) == (half if is_half else whole)
     most = [most_usd(known, 1000, 500, batched=batched) for batched in (True, False)]
     assert most[0] == pytest.approx(most[1] / (1 + is_half))
-    own = tariff_of(with_fields(served, price=whole | {"batch": {"input": 3, "output": 4}}))
-    assert price_at(own, batched=True) == Price(input=3.0, output=4.0)
+    own = costs.tariff_of(with_fields(served, price=whole | {"batch": {"input": 3, "output": 4}}))
+    assert costs.price_at(own, batched=True) == Price(input=3.0, output=4.0)
 
 
 @given(prices, st.integers(0, 10**6), st.integers(0, 10**5), st.data())
@@ -346,10 +312,10 @@ def test_no_call_costs_more_than_the_most(price, prompt, completion, data):
     ],
 )
 def test_batches_and_caches_are_priced_as_the_map_says(model_id, up_to, ending):
-    entry = map_entry(config(model_id))
-    known = tariff_of(config(model_id))
+    entry = costs.map_entry(config(model_id))
+    known = costs.tariff_of(config(model_id))
     assert known.up_to == up_to
-    price = price_at(known, batched=bool(ending))
+    price = costs.price_at(known, batched=bool(ending))
     names = ("input_cost_per_token", "output_cost_per_token", "cache_read_input_token_cost")
     told = [entry[name + ending] * 1e6 for name in names]
     assert [price.input, price.output, price.cached] == pytest.approx(told)

@@ -15,6 +15,9 @@ from phyblock.errors import UnavailableError
 from phyblock.models.client import KeyStatus, api_key, api_key_status, hidden, secrets_of
 from tests.workspace import KEY_VARIABLE
 
+PRINTABLE = st.characters(min_codepoint=33, max_codepoint=126)
+KEYS = st.text(PRINTABLE, min_size=8, max_size=60)
+
 
 @pytest.fixture(autouse=True)
 def _no_keys(monkeypatch):
@@ -48,10 +51,6 @@ def test_what_a_model_needs(fields, variables, is_needed):
 def test_a_placeholder_is_no_secret(monkeypatch, value):
     monkeypatch.setenv("OPENAI_API_KEY", value)
     assert secrets_of(config("openai/o1")) == ()
-
-
-PRINTABLE = st.characters(min_codepoint=33, max_codepoint=126)
-KEYS = st.text(PRINTABLE, min_size=8, max_size=60)
 
 
 @given(KEYS, st.text(max_size=8), st.text(max_size=8))

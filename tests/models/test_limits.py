@@ -8,6 +8,7 @@ import itertools
 from collections import Counter
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from unittest import mock
 
 import pytest
 from hypothesis import given, settings
@@ -18,28 +19,23 @@ from phyblock.errors import ModelError, RetryableError, UnavailableError
 from phyblock.models.cache import ReplyCache, reply_key
 from phyblock.models.client import HttpClient
 from phyblock.models.costs import Budget, ModelBudget
-from phyblock.models.model import (
-    MOST_CONNECTION_FAILURES,
-    ChatModel,
-    Clock,
-    Limits,
-    RetryPolicy,
-    Server,
-    Servers,
-)
+from phyblock.models.model import ChatModel, Clock, Limits, RetryPolicy, Server, Servers
 from phyblock.records.record import Reply
-from tests.models.factory import (
-    ROUTES,
-    answers,
-    ask,
-    make_model,
-    make_request,
-    requests_of,
-    with_fields,
-)
+from tests.models.factory import ROUTES, answers, ask, make_model, make_request, requests_of
 from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import in_a_loop, until
+
+tokens = st.integers(0, 300)
+calls = st.tuples(st.floats(0, 200), st.floats(0, 90), tokens, tokens)
+FINAL = [
+    *(kind("no") for kind in (errors.SampleError, errors.RefusedError, UnavailableError)),
+    *(errors.StoreError([]), ModelError("x"), ZeroDivisionError(), asyncio.CancelledError()),
+]
+statuses = st.sampled_from([None, 200, 201, 204, 408, 429, 500, 502, 503])
+seconds = st.floats(0, 600)
+REFUSED = RetryableError("connection refused", sent="no")
+steps = st.tuples(st.booleans(), st.integers(0, 50))
 
 
 class FakeTime:
@@ -85,13 +81,7 @@ def limits_of(most, overall, time=None, **fields):
     return Limits(config, overall, servers_of(1, (time or FakeTime()).policy()))
 
 
-calls = st.lists(
-    st.tuples(st.floats(0, 200), st.floats(0, 90), st.integers(0, 300), st.integers(0, 300)),
-    max_size=40,
-)
-
-
-@given(calls, st.integers(1, 10), st.integers(20, 500), st.integers(1, 8))
+@given(st.lists(calls, max_size=40), st.integers(1, 10), st.integers(20, 500), st.integers(1, 8))
 @in_a_loop
 async def test_requests_and_tokens_of_a_minute_keep_to_their_limits(arrivals, rpm, tpm, width):
     """A request waits until those before it have had their time: 60 s / rpm each, and for every
@@ -127,22 +117,17 @@ async def test_requests_and_tokens_of_a_minute_keep_to_their_limits(arrivals, rp
 
 @in_a_loop
 async def test_a_model_waiting_for_its_minute_holds_no_place_that_another_could_use():
-    time = FakeTime()
-    overall = asyncio.Semaphore(1)
-    slow = limits_of(5, overall, time, rpm=1)
-    quick = limits_of(5, overall, time)
-    finished_s = 0.0
+    time, overall, ended_s = FakeTime(), asyncio.Semaphore(1), {}
+    slow, quick = limits_of(5, overall, time, rpm=1), limits_of(5, overall, time)
 
     async def call(limits):
-        nonlocal finished_s
         async with limits.slot():
             await time.sleep(1)
-        if limits is quick:
-            finished_s = time.now_s
+        ended_s[limits] = time.now_s
 
     tasks = [asyncio.create_task(call(limits)) for limits in (slow, slow, slow, quick, quick)]
     await time.run_until_done(*tasks)
-    assert finished_s < 60
+    assert ended_s[quick] < 60
 
 
 @given(st.lists(st.tuples(st.integers(0, 5), st.booleans()), max_size=30), st.integers(1, 4))
@@ -202,12 +187,6 @@ class Script(FakeTime):
         return asyncio.run(main())
 
 
-FINAL = [
-    *(kind("no") for kind in (errors.SampleError, errors.RefusedError, UnavailableError)),
-    *(errors.StoreError([]), ModelError("x"), ZeroDivisionError(), asyncio.CancelledError()),
-]
-
-
 @pytest.mark.parametrize("error", FINAL)
 def test_nothing_but_a_retryable_error_is_sent_again(error):
     script = Script(error)
@@ -216,32 +195,19 @@ def test_nothing_but_a_retryable_error_is_sent_again(error):
     assert (len(script.sent_s), script.waits) == (1, [])
 
 
-statuses = st.sampled_from([None, 408, 429, 500, 502, 503])
-
-
-@given(
-    st.lists(statuses, min_size=1, max_size=8),
-    st.integers(1, 12),
-    st.floats(0, 600),
-    st.floats(0, 400),
-)
+@given(st.lists(statuses, min_size=1, max_size=8), st.integers(1, 12), seconds, seconds)
 def test_a_request_is_given_up_when_number_and_time_are_over(found, attempts, retry_for_s, takes_s):
-    errors = (RetryableError("x", status=status) for status in found * 400)
-    script = Script(*errors, takes_s=takes_s)
+    """Answers that were paid for and cannot be read are bounded by their number alone."""
+    failures = [RetryableError("x", status=status) for status in found * 400]
+    script = Script(*failures, takes_s=takes_s)
     with pytest.raises(RetryableError):
         script.run(attempts=attempts, retry_for_s=retry_for_s, base_s=2.0)
-    lasted = [now_s - script.sent_s[0] for now_s in script.sent_s]
-    is_over = [n >= attempts and s >= retry_for_s for n, s in enumerate(lasted, 1)]
-    assert is_over[-1]
-    assert not any(is_over[:-1])
-
-
-@pytest.mark.parametrize("status", [200, 201, 204])
-def test_answers_that_were_paid_for_and_cannot_be_read_are_bounded_by_number_alone(status):
-    script = Script(*(RetryableError("malformed", status=status) for _ in range(20)))
-    with pytest.raises(RetryableError, match="malformed"):
-        script.run(attempts=3)
-    assert len(script.sent_s) == 3
+    is_over = []
+    for number, (sent_s, failure) in enumerate(zip(script.sent_s, failures, strict=False), 1):
+        was_paid = failure.status in (200, 201, 204)
+        has_lasted = was_paid or sent_s - script.sent_s[0] >= retry_for_s
+        is_over.append(number >= attempts and has_lasted)
+    assert is_over.index(True) == len(is_over) - 1
 
 
 @given(st.lists(st.none() | st.floats(0, 500), min_size=1, max_size=7))
@@ -277,8 +243,7 @@ def test_a_request_under_way_is_given_up_at_a_second_cancellation(tmp_path, rout
         answer, is_kept = asyncio.run(main(running.url))
     assert server.requests == 1
     if cancels == 1:
-        assert isinstance(answer, Reply), answer
-        assert is_kept
+        assert (type(answer), is_kept) == (Reply, True), answer
         assert budget.spent_usd == answer.billed_usd == answer.cost_usd
     else:
         assert isinstance(answer, asyncio.CancelledError)
@@ -318,26 +283,19 @@ def test_whatever_is_waited_for_a_cancellation_ends_the_wait_and_nothing_is_sent
     assert server.requests == 1
 
 
-def test_a_bug_of_ours_is_neither_sent_again_nor_charged(monkeypatch):
-    calls = 0
-
-    async def broken(*_, **__):
-        nonlocal calls
-        calls += 1
-        raise KeyError("choices")
-
-    monkeypatch.setattr(HttpClient, "send", broken)
+def test_a_bug_of_ours_is_neither_sent_again_nor_charged():
     for route in ROUTES.values():
-        calls, budget = 0, Budget(100.0)
+        budget = Budget(100.0)
         config = route.config("http://127.0.0.1:9", price={"input": 1, "output": 1}, seed="never")
-        with pytest.raises(KeyError):
+        with (
+            mock.patch.object(HttpClient, "send", side_effect=KeyError("choices")) as send,
+            pytest.raises(KeyError),
+        ):
             ask(make_model(config, budget=budget), make_request())
-        assert (calls, budget.spent_usd) == (1, 0.0)
+        assert (send.call_count, budget.spent_usd) == (1, 0.0)
 
 
 # The servers of a model.
-
-REFUSED = RetryableError("connection refused", sent="no")
 
 
 @dataclass
@@ -363,9 +321,6 @@ class Outage:
             raise RetryableError(str(REFUSED), sent="lost")
         self.answered += 1
         return Reply(text="Step1: Move block with index 1")
-
-    async def aclose(self):
-        pass
 
 
 def ask_through(client, *, samples, width, was_heard=False):
@@ -417,7 +372,7 @@ def test_a_wrong_address_stops_the_model_after_few_attempts_and_leaves_its_sampl
     assert len(answers) == width
     assert "http://replica:1 could not be reached for" in str(answers[0])
     assert str(REFUSED) in str(answers[0])
-    assert client.failed <= width * MOST_CONNECTION_FAILURES
+    assert client.failed <= 10 * width
     assert 18 <= client.time.now_s < 300
 
 
@@ -433,17 +388,12 @@ def test_a_server_that_has_answered_is_tried_for_as_long_as_the_policy_says(begi
 
 
 @settings(max_examples=60)
-@given(
-    st.integers(1, 6),
-    st.lists(st.tuples(st.booleans(), st.integers(0, 50)), max_size=60),
-    st.data(),
-)
-def test_whoever_is_asked_is_there_and_has_no_more_to_do_than_others(count, events, data):
-    servers = servers_of(count, FakeTime().policy())
-    gone = data.draw(st.sets(st.integers(0, count - 1), max_size=count - 1))
-    for number in (*gone, *gone):
-        servers.failed(servers.all[number], REFUSED, servers.policy.clock.now())
-    there = [server for number, server in enumerate(servers.all) if number not in gone]
+@given(st.lists(st.booleans(), max_size=5), st.lists(steps, max_size=60))
+def test_whoever_is_asked_is_there_and_has_no_more_to_do_than_others(others, events):
+    servers = servers_of(1 + len(others), FakeTime().policy())
+    there = [one for one, is_there in zip(servers.all, [True, *others], strict=True) if is_there]
+    for server in 2 * [one for one in servers.all if one not in there]:
+        servers.failed(server, REFUSED, 0.0)
     assert servers.cooling_s() == 0.0
     held = []
     for begins, number in events:
@@ -507,18 +457,12 @@ def test_after_a_429_nobody_asks_before_the_server_wants(status, wait_s):
     assert servers.cooling_s() == pytest.approx(wait_s)
 
 
-def at(*urls, route="direct", **fields):
-    """The model of a route at all these addresses."""
-    config = ROUTES[route].config(urls[0], **fields)
-    return with_fields(config, api_base=tuple(url + ROUTES[route].path for url in urls))
-
-
 @pytest.mark.parametrize("route", ["direct", pytest.param("openai", marks=pytest.mark.slow)])
 def test_servers_that_die_in_the_middle_lose_nothing(route):
     servers = [OpenAIChat(Faults(latency_s=0.01), width=1) for _ in range(4)]
 
     async def main(running):
-        config = at(*(one.url for one in running), route=route)
+        config = ROUTES[route].config(*(one.url for one in running))
         model = make_model(config, policy=RetryPolicy(base_s=0.01, max_wait_s=0.05))
         asking = asyncio.create_task(answers(model, *requests_of(120)))
         await asyncio.to_thread(until, lambda: sum(server.ended["ok"] for server in servers) >= 40)
@@ -533,17 +477,16 @@ def test_servers_that_die_in_the_middle_lose_nothing(route):
     asked = sum((server.by_sample for server in servers), Counter())
     assert len(asked) == 120
     # What one loses may come to the next before that dies.
-    assert sum(asked.values()) - 120 <= 120
-    assert sum(asked.values()) <= sum(answer.attempts for answer in found)
+    assert asked.total() <= min(240, sum(answer.attempts for answer in found))
 
 
 def test_a_server_that_refuses_everything_is_left_out_and_the_last_one_stops_the_model():
     events = []
     wrong, right = OpenAIChat(Faults(mode="404")), OpenAIChat()
     with Running(wrong) as first, Running(right) as second:
-        config = at(first.url, second.url, max_concurrency=4)
+        config = ROUTES["direct"].config(first.url, second.url, max_concurrency=4)
         replies = ask(make_model(config, events=events), *requests_of(30))
-        assert [type(reply) for reply in replies] == [Reply] * 30
+        assert {type(reply) for reply in replies} == {Reply}
         assert right.ended == {"ok": 30}
         assert wrong.requests <= 4
         (text,) = (event.message for event in events if event.kind == "notice")

@@ -15,16 +15,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from phyblock import errors
 from phyblock.config.models import ModelConfig
 from phyblock.config.suite import Suite
-from phyblock.errors import (
-    DataError,
-    ModelError,
-    RefusedError,
-    RetryableError,
-    SampleError,
-    UnavailableError,
-)
+from phyblock.errors import RetryableError, SampleError, UnavailableError
 from phyblock.models import client
 from phyblock.models.client import shown
 from phyblock.models.model import RetryPolicy
@@ -33,17 +27,8 @@ from phyblock.parsing.answer import choice_form, move_form
 from phyblock.parsing.plan import plan_form
 from phyblock.records.record import Reply
 from phyblock.run.plan import to_config
-from tests.models.factory import (
-    JPEG,
-    PNG,
-    QUICK,
-    ROUTES,
-    Route,
-    ask,
-    make_model,
-    make_request,
-    picture,
-)
+from tests.models import factory
+from tests.models.factory import QUICK, ROUTES, ask, make_model, make_request, picture
 from tests.servers.chassis import FAULTS, Faults, Running
 from tests.servers.faults import WIRE_FAULTS
 from tests.servers.openai_chat import OpenAIChat
@@ -51,6 +36,20 @@ from tests.workspace import KEY
 
 OPENAI = ("direct", "openai", "vllm")
 ONCE = RetryPolicy(1, 0.0)
+LOCAL = {"api_base": "http://localhost:8000/v1"}
+SNAPSHOT = {"id": "openai/gpt-4o-2024-08-06"}
+GATEWAYS = [replace(ROUTES["vllm"], model_id=f"{name}/m") for name in ("xai", "openrouter")]
+texts = st.text(max_size=30)
+images = st.builds(
+    lambda magic, tail: Image(magic + tail, "goal", 8, 8),
+    st.sampled_from([factory.PNG, factory.JPEG, b"GIF89a", b"RIFF0000WEBP"]),
+    st.binary(max_size=40),
+)
+messages = st.builds(
+    Message,
+    st.sampled_from(["system", "user", "assistant"]),
+    st.lists(texts | images, min_size=1, max_size=5).map(tuple),
+)
 
 
 class Wire:
@@ -67,10 +66,10 @@ class Wire:
 
     def ask(self, route, *requests, faults=None, policy=QUICK, **fields):
         """Ask a new model one request after another: its answers, the server, the events."""
-        server, url = self.at(route, faults)
-        events = []
+        (server, url), events = self.at(route, faults), []
         config = ROUTES[route].config(url, **{"max_concurrency": 1, **fields})
-        return ask(make_model(config, events=events, policy=policy), *requests), server, events
+        model = make_model(config, events=events, policy=policy)
+        return ask(model, *(requests or [make_request("001", 1)])), server, events
 
     def arrived(self, route, request, **fields):
         """Return a request as it arrived at the server."""
@@ -85,17 +84,12 @@ def wire():
         yield Wire({n: stack.enter_context(Running(r.server())) for n, r in ROUTES.items()})
 
 
-@pytest.fixture(autouse=True)
-def _no_proxy(monkeypatch):
-    monkeypatch.setenv("NO_PROXY", "*")
-
-
 # What arrives.
 
 
 @pytest.mark.parametrize("route", ROUTES)
 def test_a_request_arrives_in_order_byte_for_byte_and_nothing_else(wire, route):
-    pictures = (picture(1, PNG, 150_000), picture(2, JPEG, 90_000))
+    pictures = (picture(1, factory.PNG, 150_000), picture(2, factory.JPEG, 90_000))
     request = make_request("017", 42, pictures=pictures)
     parts = list(request.messages[1].parts)
     parts[1] = ("image/png", parts[1].sha256)
@@ -163,19 +157,6 @@ def test_the_detail_arrives_in_the_words_of_the_provider(wire, route, model_id, 
     assert looked_at(seen) == [arrives, arrives]
 
 
-texts = st.text(max_size=30)
-images = st.builds(
-    lambda magic, tail: Image(magic + tail, "goal", 8, 8),
-    st.sampled_from([PNG, JPEG, b"GIF89a", b"RIFF0000WEBP"]),
-    st.binary(max_size=40),
-)
-messages = st.builds(
-    Message,
-    st.sampled_from(["system", "user", "assistant"]),
-    st.lists(texts | images, min_size=1, max_size=5).map(tuple),
-)
-
-
 @settings(max_examples=200)
 @given(
     st.lists(messages, max_size=4).map(tuple),
@@ -190,7 +171,7 @@ def test_a_body_made_around_the_encoder_says_what_the_encoder_would(content, fie
 
 def test_only_pictures_are_sent_as_pictures():
     request = make_request(pictures=(b"<html>", picture(1)))
-    with pytest.raises(DataError, match=r"'goal'.*is not a picture"):
+    with pytest.raises(errors.DataError, match=r"'goal'.*is not a picture"):
         wire_messages(request.messages, None)
 
 
@@ -206,10 +187,6 @@ def test_litellm_hands_every_schema_on(wire, form):
     assert form.key in json.dumps(gemini["response_json_schema"])
     claude = arrived("anthropic").params
     assert claude["tools"][0]["input_schema"]["properties"] == form.schema["properties"]
-
-
-LOCAL = {"api_base": "http://localhost:8000/v1"}
-SNAPSHOT = {"id": "openai/gpt-4o-2024-08-06"}
 
 
 @pytest.mark.parametrize(
@@ -254,7 +231,7 @@ ENDS = {
     **dict.fromkeys(FAULTS, (RetryableError, QUICK.attempts, ALL)),
     **dict.fromkeys(("401", "403", "404"), (UnavailableError, 1, ALL)),
     "400": (SampleError, 3, ALL),
-    "policy": (RefusedError, 3, (*OPENAI, "anthropic")),
+    "policy": (errors.RefusedError, 3, (*OPENAI, "anthropic")),
     "quota": (UnavailableError, 1, OPENAI),
     **dict.fromkeys(("ok", "length", "filtered"), (Reply, 3, ALL)),
 }
@@ -262,14 +239,11 @@ ENDS = {
 CELLS = [(route, mode) for mode, (_, _, routes) in ENDS.items() for route in routes]
 
 
-def seeded(*seeds):
-    return [make_request("001", seed) for seed in seeds]
-
-
 @pytest.mark.parametrize(("route", "mode"), CELLS)
 def test_a_call_ends_as_the_server_ends_it(wire, route, mode):
     kind, requests, _ = ENDS[mode]
-    asked = seeded(1) if kind is RetryableError else seeded(1, 2, 3)
+    seeds = (1,) if kind is RetryableError else (1, 2, 3)
+    asked = [make_request("001", seed) for seed in seeds]
     answers, server, events = wire.ask(route, *asked, faults=Faults(mode=mode), seed="never")
     assert {type(answer) for answer in answers} == {kind}, answers
     assert server.requests == requests
@@ -291,7 +265,7 @@ def test_a_call_ends_as_the_server_ends_it(wire, route, mode):
 @pytest.mark.parametrize("wish", ["7", "Wed, 21 Oct 2099 07:28:00 GMT", "nan"])
 def test_retry_after_is_read_as_seconds_and_as_a_date(wire, route, wish):
     faults = Faults(mode="429", retry_after=wish)
-    (answer,), _, _ = wire.ask(route, *seeded(1), faults=faults, policy=ONCE)
+    (answer,), _, _ = wire.ask(route, faults=faults, policy=ONCE)
     until_s = datetime(2099, 10, 21, 7, 28, tzinfo=UTC).timestamp()
     seconds = {"7": 7, "nan": None}.get(wish, pytest.approx(until_s - time.time(), abs=60))
     assert (type(answer), answer.retry_after_s) == (RetryableError, seconds)
@@ -299,23 +273,23 @@ def test_retry_after_is_read_as_seconds_and_as_a_date(wire, route, wish):
 
 @pytest.mark.parametrize("route", [*OPENAI, "gemini"])
 def test_a_refused_seed_is_an_error_that_names_it(wire, route):
-    (answer,), _, _ = wire.ask(route, *seeded(1), faults=Faults(mode="seed"))
+    (answer,), _, _ = wire.ask(route, faults=Faults(mode="seed"))
     assert (type(answer), "seed" in str(answer)) == (SampleError, True)
-    (answer,), _, _ = wire.ask(route, *seeded(1), faults=Faults(mode="seed"), seed="never")
+    (answer,), _, _ = wire.ask(route, faults=Faults(mode="seed"), seed="never")
     assert (answer.seed_sent, answer.attempts) == (False, 1)
 
 
 def test_where_no_seed_exists_none_is_sent_unless_it_must_be(wire):
-    (answer,), _, _ = wire.ask("anthropic", *seeded(1))
+    (answer,), _, _ = wire.ask("anthropic")
     assert not answer.seed_sent
-    (answer,), server, _ = wire.ask("anthropic", *seeded(1), seed="always")
+    (answer,), server, _ = wire.ask("anthropic", seed="always")
     assert (type(answer), server.requests) == (UnavailableError, 0)
 
 
 @pytest.mark.parametrize("route", ROUTES)
 def test_a_server_that_never_answers_is_a_timeout(wire, route):
     policy, faults = replace(QUICK, attempts=2), Faults(mode="slow")
-    (answer,), server, _ = wire.ask(route, *seeded(1), faults=faults, policy=policy, timeout_s=0.3)
+    (answer,), server, _ = wire.ask(route, faults=faults, policy=policy, timeout_s=0.3)
     found = (type(answer), answer.status, server.requests)
     assert found == (RetryableError, None, policy.attempts)
 
@@ -343,7 +317,7 @@ SERVERS_WORDS = {
     },
     "200-error-string": "Upstream is down",
 }
-"""What stands in the error, by fault."""
+"""Words of the error, by fault."""
 ENDINGS = {"reply": Reply, "sample": SampleError}
 ENDINGS |= {"retryable": RetryableError, "unavailable": UnavailableError}
 AS_LITELLM_READS = {
@@ -371,7 +345,7 @@ def answers_to(route, server, url, faults):
             server.faults = Faults(mode=mode)
             try:
                 found[mode] = await (hasty if mode == "drip" else model).ask(make_request())
-            except ModelError as error:
+            except errors.ModelError as error:
                 found[mode] = error
             if isinstance(found[mode], UnavailableError):
                 await model.aclose()
@@ -402,9 +376,6 @@ def test_every_fault_ends_as_it_must_after_one_request(wire, name):
     assert (whole.usage.prompt_tokens, whole.usage.completion_tokens) == (1000, 40)
     assert surrogate.text == "Step1: \ufffd index 1"
     assert all("[key]" in text for text in (echo.text, echo.provider_model))
-
-
-GATEWAYS = [Route(OpenAIChat, f"{name}/m", "/v1", "litellm") for name in ("xai", "openrouter")]
 
 
 @pytest.mark.parametrize("route", [*ROUTES.values(), *GATEWAYS], ids=lambda route: route.model_id)

@@ -4,9 +4,10 @@ import base64
 import functools
 import importlib.util
 import io
-import json
 import math
+from collections.abc import Callable
 from contextlib import ExitStack
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
@@ -19,10 +20,18 @@ from phyblock.run.plan import estimate
 from tests.models.factory import ROUTES
 from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat, answered
-from tests.workspace import CALL_USD, PRICE, TWICE, vqa_suite, write_questions
+from tests.workspace import CALL_USD, PRICE, TWICE, read_lines, vqa_suite, write_questions
 
 MOST_USD = 0.505
 """Room for 35 calls, and for no 36th, be it as estimated at first or as the run learns to."""
+
+
+COMPLETION = 40
+LITELLM = Path(importlib.util.find_spec("litellm").origin).parent
+CARRIED = LITELLM / "litellm_core_utils" / "tokenizers"
+TARIFF = {"input": 3.0, "output": 15.0}
+WITHIN = 0.05
+CALLS = 4
 
 
 def spent(workspace):
@@ -38,8 +47,8 @@ def test_the_limit_is_not_passed_and_a_higher_one_goes_on(workspace):
         assert f"of ${MOST_USD} spent; the next call can cost $" in first.out
         assert spent(workspace) == pytest.approx(CALL_USD * server.requests)
         # It stops no earlier than it must: another two calls at their dearest would pass it.
-        assert MOST_USD - 2 * (CALL_USD + 100 * PRICE["output"] / 1e6) < spent(workspace)
-        assert spent(workspace) <= MOST_USD
+        least_usd = MOST_USD - 2 * (CALL_USD + 100 * PRICE["output"] / 1e6)
+        assert least_usd < spent(workspace) <= MOST_USD
 
         asked = server.requests
         assert workspace.run("--set", f"limits.max_cost_usd={MOST_USD}").code == 1
@@ -57,8 +66,8 @@ def test_what_an_earlier_run_may_have_paid_counts_in_the_next(workspace, mode):
         codes = [workspace.run("--set", "limits.max_cost_usd=1").code for _ in range(3)]
     assert codes == [1, 1, 1]
     assert 2 <= server.requests <= 1 / dearest_reply_usd
-    lines = (workspace.out / "calls.jsonl").read_text().splitlines()
-    billed_usd = sum(json.loads(line).get("billed_usd") or 0.0 for line in lines)
+    lines = read_lines(workspace.out / "calls.jsonl")
+    billed_usd = sum(line.get("billed_usd") or 0.0 for line in lines)
     assert server.requests * dearest_reply_usd < billed_usd <= 1
 
 
@@ -66,10 +75,6 @@ def test_what_an_earlier_run_may_have_paid_counts_in_the_next(workspace, mode):
 # guide to images and vision; Anthropic, vision guide; Google, media resolution guide. Texts: OpenAI
 # by its public vocabulary o200k and three tokens a message and for the reply; Anthropic by the
 # vocabulary that litellm carries of it; Google by four characters a token.
-
-COMPLETION = 40
-LITELLM = Path(importlib.util.find_spec("litellm").origin).parent
-CARRIED = LITELLM / "litellm_core_utils" / "tokenizers"
 
 
 def tile_tokens(width, height):
@@ -122,22 +127,25 @@ def contents(body):
             yield from contents(value)
 
 
+@dataclass
 class Bill:
     """Counts every prompt as a provider does; `billed` has those of each sample."""
 
-    def __init__(self, text_tokens, picture_tokens, a_message=0):
+    text_tokens: Callable[[str], float]
+    picture_tokens: Callable[[int, int], int]
+    a_message: int = 0
+    billed: list[int] = field(default_factory=list)
+
+    def __post_init__(self):
         # Vocabularies are read here, not by the thread that serves: while it imports what reads
         # them, litellm finds that half imported.
-        text_tokens("")
-        self.billed = []
-        self._text_tokens, self._picture_tokens = text_tokens, picture_tokens
-        self._a_message = a_message
+        self.text_tokens("")
 
     def __call__(self, seen):
         parts = list(contents(seen.raw))
-        texts = sum(self._text_tokens(part) for part in parts if isinstance(part, str))
-        pictures = sum(self._picture_tokens(*part) for part in parts if not isinstance(part, str))
-        around = self._a_message * (len(seen.raw.get("messages", ())) + 1)
+        texts = sum(self.text_tokens(part) for part in parts if isinstance(part, str))
+        pictures = sum(self.picture_tokens(*part) for part in parts if not isinstance(part, str))
+        around = self.a_message * (len(seen.raw.get("messages", ())) + 1)
         self.billed.append(math.ceil(texts) + pictures + around)
         return self.billed[-1], COMPLETION
 
@@ -149,9 +157,6 @@ PROVIDERS = {
     "gemini/gemini-3.8-flash": (lambda text: len(text) / 4, lambda *_: 1120),
 }
 """By model, how its provider counts texts, pictures, and around each message."""
-TARIFF = {"input": 3.0, "output": 15.0}
-WITHIN = 0.05
-CALLS = 4
 
 
 @pytest.fixture(autouse=True)

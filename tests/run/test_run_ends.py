@@ -1,7 +1,4 @@
-"""Runs that end before their time, by Ctrl-C, a kill or a mistake of ours: all answers are kept.
-
-Runs whose models are asked in batches go on by the same command.
-"""
+"""Runs that are ended by Ctrl-C, a kill or a mistake of ours, and failures: answers are kept."""
 
 import asyncio
 import contextlib
@@ -14,13 +11,17 @@ import sqlite3
 import subprocess
 import sys
 import threading
+import time
 from functools import partial
+from pathlib import Path
 
 import psutil
 import pytest
 
 from phyblock.api import run_suite
-from phyblock.records.files import STOPPED
+from phyblock.models.cache import ReplyCache
+from phyblock.records.files import STOPPED, read_stopped
+from phyblock.results.load import load_run
 from phyblock.run.plan import estimate
 from phyblock.run.rescore import rescore
 from phyblock.run.runner import SampleDone, Session, Stopping
@@ -40,7 +41,7 @@ AT_ONCE = 4
 
 
 def interrupted(process):
-    """What a run said that ended by a signal."""
+    """The output of a run that ended by a signal."""
     out, err = process.communicate()
     assert (process.returncode, err) == (130, "")
     return out
@@ -141,18 +142,13 @@ def test_a_program_is_interrupted_in_a_run_as_well_at_any_time(workspace):
 class FirstAtOnce(OpenAIChat):
     """Answers the first request when all are there, and the others when that is long done."""
 
-    is_asked = False
-
-    async def handle(self, request):
-        is_first, self.is_asked = not self.is_asked, True
-        self.faults = Faults(latency_s=0.0 if is_first else 1.0)
-        if is_first:
-            while self.at_once < AT_ONCE - 1:
+    async def _end(self, seen, ending, request):
+        if seen is self.seen[0]:
+            while self.at_once < AT_ONCE:
                 await asyncio.sleep(0.01)
-            # The others have read by then how long they are to wait.
-            await asyncio.sleep(0.2)
-            self.faults = Faults()
-        return await super().handle(request)
+        else:
+            await asyncio.sleep(1.0)
+        return await super()._end(seen, ending, request)
 
 
 def session(workspace, watch, model):
@@ -358,7 +354,7 @@ def test_a_run_that_waits_is_stopped_and_goes_on_by_the_same_command(workspace):
         assert "has a batch in progress, whose questions would be asked twice" in said
         assert not server.by_sample
 
-        server.batch_faults = BatchFaults()
+        server.batch = BatchFaults()
         assert "All 10 samples are done" in workspace.completed("--yes").out
         assert counted_once(server, 10)
 
@@ -412,3 +408,163 @@ def test_calls_in_batches_are_estimated_at_half_the_price(workspace):
         costs.append((row.cost_usd, row.most_usd))
     assert min(costs[0]) > 0
     assert [2 * usd for usd in costs[0]] == pytest.approx(costs[1])
+
+
+# Failures of a provider and of the reply cache: retried, recorded by kind, said once.
+
+
+class BySeed(OpenAIChat):
+    """Ends each request as its seed says."""
+
+    def __init__(self, endings, **more):
+        super().__init__()
+        self._endings, self._more = endings, more
+
+    def read(self, body, request):
+        seen = super().read(body, request)
+        self.faults = Faults(mode=self._endings.get(seen.seed or 0, "ok"), **self._more)
+        return seen
+
+
+def coverage(workspace):
+    table = load_run(workspace.out).table("coverage").astype(str)
+    return {row["model"]: row for row in table.to_dict("records")}
+
+
+def test_a_model_that_cannot_answer_is_stopped_alone(workspace):
+    modes = {"locked": "401", "unknown": "404", "fine": "ok"}
+    servers = {name: OpenAIChat(Faults(mode=mode)) for name, mode in modes.items()}
+    with contextlib.ExitStack() as stack:
+        at = {name: stack.enter_context(Running(server)) for name, server in servers.items()}
+        workspace.write_served({name: running.url for name, running in at.items()})
+        workspace.write_suite(models=list(modes), seeds=list(range(20)))
+        done = workspace.run("--set", "limits.max_concurrency=6")
+        assert (done.code, done.err) == (1, "")
+        assert "locked was stopped: HTTP 401: Incorrect API key provided" in done.out
+        assert "unknown was stopped: HTTP 404: The model unknown does not exist" in done.out
+        assert "100 of 300 samples are done" in done.out
+        # Reports made later, from the folder alone, know it too.
+        stopped = read_stopped(workspace.out).models
+        told = {name: why[:8] for name, why in stopped.items()}
+        assert told == {"locked": "HTTP 401", "unknown": "HTTP 404"}
+        assert max(servers[name].requests for name in told) <= 6
+        told = coverage(workspace)
+        assert [int(told[name]["ok"]) for name in modes] == [0, 0, 100]
+        assert {row["expected"] for row in told.values()} == {"100"}
+
+        # The key is set right, the name too: the same command asks for what is missing alone.
+        for server in servers.values():
+            server.faults = Faults()
+        assert "All 300 samples" in workspace.completed("--set", "limits.max_concurrency=6").out
+    assert not (workspace.out / STOPPED).exists()
+    assert {server.ended["ok"] for server in servers.values()} == {100}
+
+
+def test_a_model_that_is_stopped_waits_for_no_other_attempt(workspace):
+    server = BySeed({0: "429", 1: "401"}, retry_after="100")
+    with workspace.served(server, seeds=[0, 1]), workspace.start("--limit", "1") as process:
+        out, err = process.communicate(timeout=60)
+    assert (process.returncode, err) == (1, "")
+    assert "alpha was stopped: HTTP 401" in out
+    assert "0 of 2 samples are done" in out
+
+
+def test_a_sample_whose_every_attempt_failed_is_asked_again_by_the_same_command(workspace):
+    endings = {1: "500"}
+    few = ("--set", "limits.max_attempts=2", "--set", "limits.retry_for_s=0")
+    with workspace.served(BySeed(endings), seeds=[0, 1]) as server:
+        assert workspace.run(*few).code == 1
+        assert server.requests == 5 + 2 * 5
+        endings.clear()
+        workspace.completed(*few)
+        assert server.requests == 5 + 2 * 5 + 5
+    assert {record["outcome"] for record in workspace.records()[-5:]} == {"ok"}
+
+
+def test_each_way_to_fail_is_an_outcome_of_its_own(workspace):
+    endings = {1: "400", 2: "policy", 3: "length", 4: "filtered", 5: "blank"}
+    outcomes = ("ok", "api_error", "refusal", "truncated", "refusal", "parse_failure")
+    with workspace.served(BySeed(endings), seeds=[0, 1, 2, 3, 4, 5]) as server:
+        # One request was rejected for good.
+        assert workspace.run().code == 1
+        records = workspace.records()
+        found = {(record["seed"], record["outcome"]) for record in records}
+        assert found == set(enumerate(outcomes))
+        for record in records:
+            whole = [score for score in record["scores"] if score["criterion"] == "aov"]
+            scored = {(score["setting"], score["matcher"]) for score in whole}
+            assert scored == set(itertools.product("AB", ("optimal", "paper")))
+        assert workspace.run().code == 1
+        assert server.requests == 30
+    told = coverage(workspace)["alpha"]
+    for name in outcomes:
+        assert int(told[name]) == 5 * outcomes.count(name)
+
+
+@contextlib.contextmanager
+def locked(workspace, begin="BEGIN IMMEDIATE"):
+    """The reply cache, held as another process would hold it, or not."""
+    path = workspace.cache / "replies.sqlite"
+    ReplyCache(path).close()
+    with contextlib.closing(sqlite3.connect(path, isolation_level=None)) as db:
+        db.execute(begin)
+        yield db
+
+
+@pytest.mark.parametrize("room", [3, SAMPLES - 1])
+def test_a_cache_that_takes_no_more_is_said_once_and_all_is_recorded(workspace, room):
+    with locked(workspace, begin="") as db, prepare(workspace, OpenAIChat()) as server:
+        db.execute(
+            "CREATE TRIGGER full BEFORE INSERT ON replies WHEN (SELECT count(*) FROM replies) >= "
+            f"{room} BEGIN SELECT RAISE(ABORT, 'the disk is full'); END"
+        )
+        done = workspace.completed()
+        (said,) = [line for line in done.out.splitlines() if "the disk is full" in line]
+        assert str(workspace.cache / "replies.sqlite") in said
+        assert "going on without it" in said
+        assert f"All {SAMPLES} samples are done" in done.out
+        assert server.ended == {"ok": SAMPLES}
+        assert [record["outcome"] for record in workspace.records()] == ["ok"] * SAMPLES
+        assert db.execute("SELECT count(*) FROM replies").fetchone() == (room,)
+        db.execute("DROP TRIGGER full")
+        workspace.completed()
+        assert server.requests == SAMPLES
+
+
+def test_a_disk_that_takes_neither_replies_nor_records_ends_the_run_after_few_calls(workspace):
+    with prepare(workspace, OpenAIChat(Faults(latency_s=0.01))) as server:
+        workspace.completed("--limit", "1", "--models", "random")
+        workspace.out = workspace.root / "full"
+        done = workspace.run(bytes_left=20_000)
+        assert done.code == 2
+        assert done.err.count("error: ") == 1
+        kept = len(workspace.records())
+        asked = server.requests
+        assert kept < SAMPLES
+        assert asked - kept <= 2 * AT_ONCE
+
+        workspace.completed()
+        assert server.requests <= asked + SAMPLES - kept
+        assert len({record["sample"] for record in workspace.records()}) == SAMPLES
+
+
+def test_ctrl_c_ends_a_run_whose_cache_is_locked(workspace):
+    def catches_sigterm():
+        """As a process that asks models does."""
+        status = Path(f"/proc/{process.pid}/status").read_text(encoding="utf-8")
+        (mask,) = re.findall(r"^SigCgt:\s*(\w+)", status, re.MULTILINE)
+        return int(mask, 16) >> (signal.SIGTERM - 1) & 1
+
+    with prepare(workspace, OpenAIChat()), locked(workspace), workspace.start() as process:
+        until(catches_sigterm)
+        time.sleep(1.0)
+        process.send_signal(signal.SIGINT)
+        assert "(interrupted)" in interrupted(process)
+
+
+@pytest.mark.slow
+def test_a_run_with_a_locked_cache_ends_as_without_one(workspace):
+    with prepare(workspace, OpenAIChat()) as server, locked(workspace):
+        done = workspace.completed()
+        assert done.out.count("database is locked") == 1
+        assert server.requests == SAMPLES

@@ -13,6 +13,7 @@ from collections import Counter
 from contextlib import closing
 from functools import partial
 from pathlib import Path
+from unittest import mock
 
 import pytest
 import yaml
@@ -22,14 +23,8 @@ from hypothesis import strategies as st
 import phyblock
 from phyblock.data.base import VERSION_FILE, read_version
 from phyblock.errors import DataError, SpecError, StoreError
-from phyblock.records.files import (
-    BatchLines,
-    CallLines,
-    PromptLines,
-    RecordLines,
-    read_manifest,
-    read_prompts,
-)
+from phyblock.records import files
+from phyblock.records.files import read_manifest, read_prompts
 from phyblock.records.record import Call, Reply
 from phyblock.results.compare import check_pair, compare
 from phyblock.results.estimates import Headline
@@ -40,10 +35,15 @@ from tests.servers.openai_chat import OpenAIChat
 from tests.web.factory import manifest, run_of
 from tests.workspace import call, until
 
+lines = st.dictionaries(st.text(max_size=5), st.text(max_size=5) | st.integers(), max_size=4)
+cents = st.integers(0, 8)
+samples = st.sampled_from(["s/1", "s/2", ""])
+calls = st.tuples(samples, st.sampled_from("ab"), cents, st.booleans(), st.none() | cents)
+
 
 @pytest.fixture(scope="module")
 def finished(new_workspace):
-    """A run of a model that answers, one whose every call fails, and two baselines."""
+    """A run of a model that answers, and of two baselines."""
     made = new_workspace()
     with made.served(OpenAIChat(), models=["alpha", "random", "oracle"], seeds=[0, 1, 2]):
         made.completed()
@@ -229,8 +229,6 @@ def test_scores_can_be_made_where_the_data_set_has_moved(copy):
 
 # The files of a run folder: appended whole, read whole, each prompt once.
 
-lines = st.dictionaries(st.text(max_size=5), st.text(max_size=5) | st.integers(), max_size=4)
-
 
 @given(st.lists(st.lists(lines, max_size=3), max_size=5))
 def test_what_is_appended_is_what_is_read(tmp_path_factory, batches):
@@ -266,31 +264,28 @@ def test_a_file_that_somebody_changes_meanwhile_is_not_written_on(tmp_path, chan
     assert (path.read_bytes() if path.exists() else None) == left
 
 
-@pytest.mark.parametrize("lines", [RecordLines, CallLines, PromptLines, BatchLines])
-@pytest.mark.parametrize(
-    ("line", "said"),
-    [(b"\0" * 40, "zero bytes"), (b"\0" * 40 + b"\n", "zero bytes"), (b"{}\r\n", "CR LF")],
-)
-def test_zero_bytes_and_foreign_line_ends_are_named(tmp_path, lines, line, said):
-    read = lines(tmp_path)
+@pytest.mark.parametrize("name", ["RecordLines", "CallLines", "PromptLines", "BatchLines"])
+@pytest.mark.parametrize("line", [b"\0" * 40, b"\0" * 40 + b"\n", b"{}\r\n"])
+def test_zero_bytes_and_foreign_line_ends_are_named(tmp_path, name, line):
+    read = getattr(files, name)(tmp_path)
     read.path.write_bytes(line)
+    said = "CR LF" if b"\r" in line else "zero bytes"
     with pytest.raises(StoreError, match=rf"\.jsonl:1: is not a {read.noun}: it .*{said}"):
         list(read)
 
 
 @pytest.mark.parametrize("call", ["fstat", "write", "fsync"])
-def test_a_disk_that_fails_at_any_call_leaves_what_was_written(tmp_path, monkeypatch, call):
+def test_a_disk_that_fails_at_any_call_leaves_what_was_written(tmp_path, call):
     file = AppendFile(tmp_path / "lines.jsonl")
     file.append([{"a": 1}])
 
-    def fail(*_):
-        raise OSError(errno.ESTALE, os.strerror(errno.ESTALE))
-
-    with monkeypatch.context() as patch:
-        # No disk here fails so on demand; one over a network does.
-        patch.setattr(os, call, fail)
-        with pytest.raises(StoreError, match="Stale file handle"):
-            file.append([{"a": 2}])
+    # No disk here fails so on demand; one over a network does.
+    gone = OSError(errno.ESTALE, os.strerror(errno.ESTALE))
+    with (
+        mock.patch.object(os, call, side_effect=gone),
+        pytest.raises(StoreError, match="Stale file handle"),
+    ):
+        file.append([{"a": 2}])
     assert (tmp_path / "lines.jsonl").read_text() == '{"a":1}\n'
     file.append([{"a": 3}])
     file.close()
@@ -315,11 +310,6 @@ def test_a_run_is_on_disk_with_its_name_before_anything_is_asked(workspace, monk
         store.records.append([{"a": 1}])
         store.records.append([{"a": 2}])
     assert [path for path, _ in synced[2:]] == [folder] + [f"{folder}/records.jsonl"] * 2
-
-
-cents = st.integers(0, 8)
-samples = st.sampled_from(["s/1", "s/2", ""])
-calls = st.tuples(samples, st.sampled_from("ab"), cents, st.booleans(), st.none() | cents)
 
 
 @given(st.lists(calls, max_size=12))

@@ -30,8 +30,8 @@ WAYS = [
 ]
 
 
-def config_of(model_id, transport="auto"):
-    spec = ModelConfig(id=model_id, api_key_env=KEY_VARIABLE, transport=transport)
+def config_of(model_id):
+    spec = ModelConfig(id=model_id, api_key_env=KEY_VARIABLE)
     return to_config("m", spec, Suite(name="s", models=("m",)))
 
 
@@ -75,14 +75,10 @@ def told(seen):
 def test_keys_and_pictures_stay_off_the_disk(workspace, transport):
     echoes = {f"echo-key-{kind}": 0.04 for kind in ("in-reply", "json", "cut", "page")}
     faults = Faults({"429": 0.1, "500": 0.1, "html": 0.1, **echoes}, retry_after="0")
-    kinds = {
-        "talks": faults,
-        "locked": Faults(mode="echo-key"),
-        "refuses": Faults(mode="echo-key-json"),
-    }
+    kinds = {"locked": Faults(mode="echo-key"), "refuses": Faults(mode="echo-key-json")}
     entries, used = {}, []
     with ExitStack() as stack:
-        for name, each in kinds.items():
+        for name, each in {"talks": faults, **kinds}.items():
             server = OpenAIChat(each, say=told, think=told)
             url = stack.enter_context(Running(server)).url
             entries[name] = {"id": f"hosted_vllm/{name}", "api_base": f"{url}/v1"}

@@ -1,11 +1,15 @@
-"""Whole runs of questions and of episodes, of all tracks that ask for JSON, and in other ways."""
+"""Whole runs: of questions and of episodes, of all tracks that ask for JSON, in other ways, and of
+another version.
+"""
 
 import hashlib
 import itertools
 import json
 import re
+import shutil
 from collections import Counter
 from dataclasses import replace
+from functools import partial
 
 import pytest
 import yaml
@@ -14,21 +18,30 @@ from PIL import Image as PillowImage
 from phyblock.data.scenes import read_builtin
 from phyblock.domain.question import LETTERS
 from phyblock.domain.scene import AssemblyTask, Candidate, CandidateSet, Scene
-from phyblock.errors import InputError, SpecError
+from phyblock.errors import InputError, SpecError, StoreError
+from phyblock.parsing.answer import parse_move
+from phyblock.parsing.plan import parse_plan
+from phyblock.records.files import read_manifest
 from phyblock.results.compare import compare
 from phyblock.results.load import load_run
+from phyblock.run import manifest, store
 from phyblock.run.rescore import rescore
 from phyblock.sim.engine import ENGINES, described_engine, installed_engines
 from phyblock.sim.pictures import PictureStyle, candidates_png, goal_png
+from phyblock.tracks import full_planning, step_planning
 from phyblock.tracks.base import presented
 from tests.servers.chassis import Faults, Running
 from tests.servers.openai_chat import OpenAIChat, answered
 from tests.sim.structures import counterweighted_beam
 from tests.tracks.conftest import raw_of
-from tests.workspace import call, plan_text, questions, vqa_suite, write_questions
+from tests.workspace import call, plan_text, problem_of, questions, vqa_suite, write_questions
 
 TRACKS = ["full_planning", "step_planning", "vqa"]
 FORMAT = {"answer_format": "json_schema"}
+PLANS = {"tracks": ["full_planning"], "seeds": list(range(40))}
+STYLE = PictureStyle(size_px=128)
+SEEDS = (0, 1)
+EARLIER = 5
 
 
 def schema_of(seen):
@@ -53,13 +66,8 @@ def rules(record):
 
 def test_all_tracks_ask_and_read_by_the_schema(inside):
     write_questions(inside.root / "questions", questions(subtasks=["SH", "OR"], per_subtask=1))
-    inside.write_suite(
-        tracks=TRACKS,
-        models=["alpha", "beta", "random"],
-        vqa={"path": "./questions"},
-        steps={"physics": "off", "max_steps": 2},
-        **FORMAT,
-    )
+    asked = vqa_suite() | {"tracks": TRACKS, "steps": {"physics": "off", "max_steps": 2}} | FORMAT
+    inside.write_suite(models=["alpha", "beta", "random"], **asked)
     server = OpenAIChat(say=obedient)
     with Running(server) as running:
         base = {"api_base": f"{running.url}/v1"}
@@ -169,9 +177,6 @@ def by_sample(records):
     return {record["sample"]: stable(record) for record in records}
 
 
-PLANS = {"tracks": ["full_planning"], "seeds": list(range(40))}
-
-
 @pytest.mark.parametrize("fields", [PLANS, {"limit": 3}])
 def test_faults_change_nothing_and_every_request_is_an_attempt(workspace, fields):
     found = []
@@ -230,9 +235,6 @@ def test_an_episode_of_which_no_reply_is_whole_is_no_parse_failure(workspace, mo
 
 # Runs that ask in other ways: shuffled, blind, and varied.
 
-STYLE = PictureStyle(size_px=128)
-SEEDS = (0, 1)
-
 
 def tasks_of(workspace):
     return {task.key: task for task in read_builtin(workspace.root / "data").tasks}
@@ -262,7 +264,9 @@ def test_a_model_that_looks_is_right_in_every_order(workspace):
     assert "[candidates shuffled]" in done.out
     assert set(overall_f1(workspace).values()) == {1.0}
     # Stored replies are read as they were asked for: in the numbers that were shown.
-    again = workspace.records(workspace.scored())
+    scored = shutil.copytree(workspace.out, workspace.root / "scored")
+    workspace.does("score", scored, "--jobs", "1")
+    again = workspace.records(scored)
     assert [record["scores"] for record in again] == [r["scores"] for r in workspace.records()]
     # All models were shown the same order, in whose numbers they answered.
     for record in workspace.records():
@@ -316,3 +320,137 @@ def test_blind_baselines_are_scored_beside_models_without_being_named(workspace)
     workspace.out = workspace.root / "alone"
     workspace.completed()
     assert {record["model"] for record in workspace.records()} == {"random"}
+
+
+# Runs that another version judged: refused until they are scored, then gone on with.
+
+
+class Stopping(OpenAIChat):
+    """Takes no key any more once it has given so many answers; `answered` names their requests."""
+
+    def __init__(self, answers):
+        super().__init__(say=self.said)
+        self.answers, self.answered = answers, []
+
+    def said(self, seen):
+        self.answered.append(seen.sample)
+        if len(self.answered) >= self.answers:
+            self.faults = Faults(mode="401")
+        return answered(seen)
+
+
+def run(out, *args):
+    return call("run", "suite.yaml", "--out", out, "--no-report", "--yes", "--no-cache", *args)
+
+
+def score(folder, *args):
+    return call("score", folder, "--jobs", "1", *args)
+
+
+def read_earlier(monkeypatch):
+    """Read as readers of an earlier version, which did not read all numbers."""
+    monkeypatch.setattr(manifest, "READER_VERSION", EARLIER)
+    for module, read in ((full_planning, parse_plan), (step_planning, parse_move)):
+        monkeypatch.setattr(module, read.__name__, partial(reads, read))
+
+
+def reads(read, text, *rest):
+    return read(re.sub(r"\(2\)|\(4\)|(?<=index )3", "?", text), *rest)
+
+
+@pytest.fixture
+def begun(inside, monkeypatch):
+    """A run of two tracks that earlier readers began, stopped in the middle of episodes; the
+    server, which answers again.
+    """
+    with Running(server := Stopping(22)) as running:
+        inside.write_models(running.url, "alpha", max_tokens=100)
+        inside.write_suite(
+            tracks=["full_planning", "step_planning"],
+            models=["random", "alpha"],
+            images={"size_px": 128, "layout": "separate"},
+            limits={"max_concurrency": 3},
+            steps={"physics": "off", "max_steps": 4},
+        )
+        with monkeypatch.context() as earlier:
+            read_earlier(earlier)
+            assert run("out") == 1
+        server.faults, server.answers = Faults(), 10**6
+        yield server
+
+
+def newest(workspace, folder):
+    """The newest record of every sample, but for what differs between two runs."""
+    return by_sample(workspace.records(workspace.root / folder))
+
+
+def test_it_is_refused_until_it_is_scored_and_ends_as_if_begun_today(begun, workspace, capsys):
+    before, earlier = newest(workspace, "out"), read_manifest(workspace.out)
+    files = workspace.files()
+    for args in ((), ("--dry-run",)):
+        problem = problem_of(StoreError, run, "out", *args)
+        assert "by another version" in str(problem)
+        assert f"readers {EARLIER}" in problem.found
+        assert problem.hint.startswith("phyblock score out first")
+    assert workspace.files() == files
+    answered = len(begun.answered)
+    capsys.readouterr()
+    assert score("out") == 0
+    assert len(begun.answered) == answered
+    scored = newest(workspace, "out")
+    diverged = {name for name, one in scored.items() if one["error"] and not before[name]["error"]}
+    assert f"in {len(diverged)} episodes this version would have asked" in capsys.readouterr().err
+    assert {scored[name]["model"] for name in diverged} == {"random", "alpha"}
+    assert any(scored[name]["scores"] != one["scores"] for name, one in before.items())
+    now = read_manifest(workspace.out)
+    assert (now.identity, now.created) == (earlier.identity, earlier.created)
+
+    assert run("out") == 0
+    assert max(Counter(begun.answered).values()) == 1, "a reply that still holds was asked again"
+    assert len(begun.answered) > answered
+    assert run("fresh") == 0
+    assert newest(workspace, "out") == newest(workspace, "fresh")
+
+
+@pytest.mark.usefixtures("begun")
+def test_kills_processes_and_shards_end_in_the_same_records(workspace, monkeypatch):
+    def records(name):
+        return (workspace.root / name / "records.jsonl").read_bytes()
+
+    for name in ("whole", "1", "2", "processes", "shards"):
+        shutil.copytree(workspace.out, workspace.root / name)
+    assert score("whole") == 0
+    for writes in (1, 2):
+        name, write, lives = str(writes), store.atomic_write, iter(range(writes - 1))
+
+        def dying(*args, lives=lives, write=write, **options):
+            if next(lives, None) is None:
+                raise KeyboardInterrupt
+            write(*args, **options)
+
+        with monkeypatch.context() as dies:
+            dies.setattr(store, "atomic_write", dying)
+            with pytest.raises(KeyboardInterrupt):
+                rescore(workspace.root / name)
+        assert (records(name) == records("out")) == (writes == 1)
+        with pytest.raises(StoreError, match="by another version"):
+            run(name)
+        assert score(name) == 0
+        assert newest(workspace, name) == newest(workspace, "whole")
+    assert run("2") == 0
+    assert call("score", "processes", "--jobs", "2") == 0
+    for shard in ("2/3", "1/3", "3/3"):
+        assert score("shards", "--shard", shard) == 0
+    assert records("processes") == records("shards") == records("whole")
+
+
+@pytest.mark.usefixtures("begun")
+def test_answers_of_a_shard_about_earlier_records_are_refused(workspace):
+    assert score("out", "--shard", "1/1") == 0
+    assert run("out") == 0
+    before = newest(workspace, "out")
+    with pytest.raises(StoreError, match="is not the record that was scored"):
+        score("out", "--shard", "1/1")
+    assert newest(workspace, "out") == before
+    assert score("out") == 0
+    assert newest(workspace, "out") == before

@@ -1,7 +1,5 @@
-"""Servers of batches in three protocols: made, looked at, answered; with faults and moments to
-break off.
-
-A batch answers each of its requests as the server would answer it alone, and counts it as asked.
+"""Servers of batches in three protocols, with faults and moments to break off. A batch answers each
+of its requests as the server would answer it alone, and counts it as asked.
 """
 
 import json
@@ -43,9 +41,7 @@ class BatchFaults:
 
 @dataclass
 class Made:
-    """A batch; `state` is running until it was looked at often enough. It has lines of requests
-    that were answered, and of those that were not.
-    """
+    """A batch, with lines of requests that were answered, and of those that were not."""
 
     token: str
     requests: list[tuple[str, dict[str, Any]]]
@@ -62,29 +58,26 @@ class Made:
         return f"batch-{self.ordinal}"
 
 
+@dataclass(eq=False, kw_only=True)
 class BatchServer(LocalServer):
-    """One protocol's batches; `asked` counts each request that was worked on, by sample.
-
-    The class of a protocol gives it `line`, a line of the results, and `told`, which is what the
-    provider says of a batch.
+    """One protocol's batches; `asked` counts each request that was worked on, by sample. The class
+    of a protocol gives it `line`, a line of the results, and `told`, what it says of a batch.
     """
 
-    def __init__(self, *args: Any, batch: BatchFaults | None = None, **options: Any) -> None:
-        super().__init__(*args, **options)
-        self.batch_faults = batch or BatchFaults()
-        self.made: list[Made] = []
-        self.files: list[list[dict[str, Any]]] = []
-        self.asked: Counter[str] = Counter()
-        self.calls: list[str] = []
-        self.under_way = 0
-        self.keys: set[str] = set()
-        self.moment: Callable[[str], None] = lambda _: None
+    batch: BatchFaults = BatchFaults()
+    made: list[Made] = field(default_factory=list)
+    files: list[list[dict[str, Any]]] = field(default_factory=list)
+    asked: Counter[str] = field(default_factory=Counter)
+    calls: list[str] = field(default_factory=list)
+    under_way: int = 0
+    keys: set[str] = field(default_factory=set)
+    moment: Callable[[str], None] = lambda _: None
 
     def call(self, kind: str, work: Callable[[web.Request], Awaitable[Any]]) -> Handler:
         """A handler that does a call's work, or what it meets; moments lie before and after."""
 
         async def answer(request: web.Request) -> web.StreamResponse:
-            faults = self.batch_faults.calls.get(kind, ())
+            faults = self.batch.calls.get(kind, ())
             fault = dict(enumerate(faults)).get(self.calls.count(kind), "")
             self.calls.append(kind)
             self.keys.add(self.key_of(request))
@@ -113,8 +106,8 @@ class BatchServer(LocalServer):
         """A call that looks at a batch, and brings it nearer to its end."""
         made = self.find(request)
         made.looks += 1
-        if made.state == "running" and made.looks >= self.batch_faults.looks:
-            made.state = self.batch_faults.ends.get(made.ordinal, "ended")
+        if made.state == "running" and made.looks >= self.batch.looks:
+            made.state = self.batch.ends.get(made.ordinal, "ended")
             if made.state != "refused":
                 self._answer(made)
         return self.told(made)
@@ -125,8 +118,8 @@ class BatchServer(LocalServer):
         self.made.append(made)
         made.seen = [self.read(body, call) for _, body in requests]
         self.seen += made.seen
-        if self.batch_faults.ends.get(made.ordinal) != "refused":
-            faults = self.batch_faults.lines.get(made.ordinal, {})
+        if self.batch.ends.get(made.ordinal) != "refused":
+            faults = self.batch.lines.get(made.ordinal, {})
             for place, seen in enumerate(made.seen):
                 self.asked[seen.sample] += faults.get(place) not in NEVER_ASKED
         return self.told(made)
@@ -141,7 +134,7 @@ class BatchServer(LocalServer):
         return next(made for made in self.made if made.id == wanted)
 
     def _answer(self, made: Made) -> None:
-        faults = self.batch_faults.lines.get(made.ordinal, {})
+        faults = self.batch.lines.get(made.ordinal, {})
         for place, ((custom_id, _), seen) in enumerate(zip(made.requests, made.seen, strict=True)):
             ending = faults.get(place, "ok")
             if ending == "missing":

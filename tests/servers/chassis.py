@@ -1,8 +1,7 @@
 """Parts that the local servers share: counting, faults, running in a thread or as a process.
 
-A server derives a sample's id from the content of its messages and its seed, and draws faults from
-that id and the number of times the sample was asked, so that a run meets the same faults whatever
-the order of its requests.
+Faults are drawn from the content of a request and the number of times that it was asked, so that a
+run meets the same ones whatever the order of its requests.
 """
 
 from __future__ import annotations
@@ -13,15 +12,15 @@ import base64
 import hashlib
 import json
 from collections import Counter, deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from typing import Any
 
 from aiohttp import web
 from anyio.from_thread import start_blocking_portal
 
-from tests.servers.faults import WIRE_FAULTS, reset_connection
+from tests.servers.faults import WIRE_FAULTS
 from tests.workspace import plan_text
 
 FAULTS = ("429", "500", "reset", "cut", "html", "empty")
@@ -44,11 +43,6 @@ class Faults:
     retry_after: str = "1"
     mode: str = "ok"
     seed: int = 0
-
-    @classmethod
-    def spread(cls, names: Sequence[str], share: float, **fields: Any) -> Faults:
-        """Faults of which each of the names takes the same part of `share`."""
-        return cls({name: share / len(names) for name in names}, **fields)
 
     def draw(self, sample: str, nth: int) -> str:
         """The way in which the nth request of a sample ends."""
@@ -97,30 +91,30 @@ class Seen:
         return plan_text(*(byte % 16 + 1 for byte in digest[:4]))
 
 
+@dataclass(eq=False)
 class LocalServer:
     """A server of one protocol, whose class gives it `add_routes`, which lead to `handle`; `read`,
     a request in common terms; `reply` by its ending, one of REPLIES; and `error`, an error body.
 
     `ended` counts requests by how they ended. `elsewhere` is where redirects to another host lead.
     At most `width` requests are looked at together. While it `holds`, which a test may end, no
-    request is answered. `usage` counts the tokens of a prompt and its reply.
+    request is answered. `usage` counts the tokens of a prompt and its reply, which says what `say`
+    gives and reasons what `think` gives.
     """
 
-    def __init__(
-        self,
-        faults: Faults | None = None,
-        *,
-        elsewhere: str = "http://localhost:9",
-        width: int = 10_000,
-        holds: bool = False,
-        usage: Callable[[Seen], tuple[int, int]] = lambda _: (1000, 40),
-    ) -> None:
-        self._gate = asyncio.Semaphore(width)
-        self.elsewhere = elsewhere
-        self.holds = holds
-        self.usage = usage
+    faults: Faults | None = None
+    _: KW_ONLY
+    elsewhere: str = "http://localhost:9"
+    width: int = 10_000
+    holds: bool = False
+    usage: Callable[[Seen], tuple[int, int]] = lambda _: (1000, 40)
+    say: Callable[[Seen], str] = lambda seen: seen.reply_text
+    think: Callable[[Seen], str] = lambda _: "Let me see."
+
+    def __post_init__(self) -> None:
+        self._gate = asyncio.Semaphore(self.width)
         self.at_once = 0
-        self.forget(faults)
+        self.forget(self.faults)
 
     def forget(self, faults: Faults | None = None) -> None:
         """Begin as new, with other faults."""
@@ -131,7 +125,10 @@ class LocalServer:
 
     @property
     def requests(self) -> int:
-        return sum(self.ended.values())
+        return self.ended.total()
+
+    def text(self, seen: Seen, ending: str) -> str:
+        return "" if ending in ("length", "filtered", "blank") else self.say(seen)
 
     async def handle(self, request: web.Request) -> web.StreamResponse:
         async with self._gate:
@@ -154,15 +151,8 @@ class LocalServer:
     async def _end(self, seen: Seen, ending: str, request: web.Request) -> web.StreamResponse:
         if ending in WIRE_FAULTS:
             return await WIRE_FAULTS[ending].behave(self, seen, request)
-        if ending == "reset":
-            return reset_connection(request)
         if ending == "slow":
             await asyncio.sleep(3600)
-        if ending == "html":
-            return web.Response(text="<html>Bad gateway</html>", content_type="text/html")
-        if ending == "cut":
-            whole = json.dumps(self.reply(seen, "ok"))
-            return web.Response(text=whole[: len(whole) // 2], content_type="application/json")
         if ending in REPLIES:
             return web.json_response(self.reply(seen, ending))
         status, message = {
@@ -183,9 +173,8 @@ class LocalServer:
 
 
 class Running:
-    """A server on a free port, in a thread with a loop of its own; a context manager.
-
-    It may die and come back, on the same port, any number of times.
+    """A server on a free port, in a thread with a loop of its own; a context manager. It may die
+    and come back, on the same port, any number of times.
     """
 
     def __init__(self, server: LocalServer) -> None:

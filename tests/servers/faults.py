@@ -1,8 +1,7 @@
 """Faults by name: what a server can do to whoever asks it, one behaviour each.
 
 `WIRE_FAULTS` holds them all; each is a mode of `Faults`, beside those that the chassis knows. A
-behaviour gets the server, the request as it was read, and the request itself, and ends it; `Ending`
-says what has to come of that, whatever the protocol.
+behaviour gets the server and a request, and ends it; `Ending` says what has to come of that.
 """
 
 from __future__ import annotations
@@ -44,6 +43,10 @@ def reset_connection(request: web.Request) -> web.Response:
         raw.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, lingering)
         transport.abort()
     return web.Response()
+
+
+async def _reset(_: LocalServer, __: Seen, request: web.Request) -> web.Response:
+    return reset_connection(request)
 
 
 async def _redirect(
@@ -183,9 +186,8 @@ def _packed(
     )
 
 
-def _half(plain: bytes) -> bytes:
-    packed = gzip.compress(plain)
-    return packed[: len(packed) // 2]
+def _half(data: bytes) -> bytes:
+    return data[: len(data) // 2]
 
 
 def _nested(body: dict[str, Any], _: Seen) -> dict[str, Any]:
@@ -274,7 +276,10 @@ WIRE_FAULTS: Mapping[str, Fault] = {
     "echo-key-page": _sent(
         lambda _, seen: f"<html>{'x' * 60} {seen.key}</html>".encode(), Content_Type="text/html"
     ),
-    # Connections that break, and bodies that never end or explode.
+    # Connections that break, and bodies that end early, never end or explode.
+    "reset": Fault(_reset),
+    "cut": _sent(lambda body, _: _half(json.dumps(body).encode())),
+    "html": _sent(b"<html>Bad gateway</html>", Content_Type="text/html"),
     "reset-midway": Fault(partial(_reset_midway, claimed=0, resets=True)),
     "short-body": Fault(partial(_reset_midway, claimed=5_000, resets=False)),
     "no-http": _raw(b"HELO mail.example\r\n\r\n"),
@@ -286,11 +291,10 @@ WIRE_FAULTS: Mapping[str, Fault] = {
     "drip": _stream(b" ", pause_s=0.02),
     "gzip": _packed(gzip.compress, "gzip", "reply"),
     "deflate": _packed(zlib.compress, "deflate", "reply"),
-    "gzip-cut": _packed(_half, "gzip"),
+    "gzip-cut": _packed(lambda plain: _half(gzip.compress(plain)), "gzip"),
     "gzip-that-is-none": _packed(bytes, "gzip"),
     "brotli-that-is-none": _packed(gzip.compress, "br"),
     "gzip-bomb": _bomb("gzip"),
     "deflate-bomb": _bomb("deflate"),
     "gzip-twice-bomb": _bomb("gzip, gzip"),
 }
-"""Every fault by its name."""

@@ -2,29 +2,15 @@
 
 import hashlib
 import json
-from collections.abc import Callable
 from typing import Any
 
 from aiohttp import web
 
-from tests.servers.chassis import Faults, LocalServer, Seen, main, picture_part
-
-_CODES = {"policy": "content_policy_violation", "quota": "insufficient_quota"}
+from tests.servers.chassis import LocalServer, Seen, main, picture_part
 
 
 class OpenAIChat(LocalServer):
-    """POST /v1/chat/completions; a reply says what `say` gives and reasons what `think` gives."""
-
-    def __init__(
-        self,
-        faults: Faults | None = None,
-        *,
-        say: Callable[[Seen], str] = lambda seen: seen.reply_text,
-        think: Callable[[Seen], str] = lambda _: "Let me see.",
-        **options: Any,
-    ) -> None:
-        super().__init__(faults, **options)
-        self.say, self.think = say, think
+    """POST /v1/chat/completions."""
 
     def add_routes(self, app: web.Application) -> None:
         app.router.add_post("/v1/chat/completions", self.handle)
@@ -46,8 +32,8 @@ class OpenAIChat(LocalServer):
 
     def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
         finish = {"length": "length", "filtered": "content_filter"}.get(ending, "stop")
-        text = "" if ending in ("length", "filtered", "blank") else self.say(seen)
-        message = {"role": "assistant", "content": text, "reasoning_content": self.think(seen)}
+        message = {"role": "assistant", "content": self.text(seen, ending)}
+        message["reasoning_content"] = self.think(seen)
         prompt, completion = self.usage(seen)
         usage = {"prompt_tokens": prompt, "completion_tokens": completion}
         choice = {"index": 0, "message": message, "finish_reason": finish}
@@ -61,7 +47,7 @@ class OpenAIChat(LocalServer):
         }
 
     def error(self, status: int, ending: str, message: str) -> dict[str, Any]:
-        code = _CODES.get(ending)
+        code = {"policy": "content_policy_violation", "quota": "insufficient_quota"}.get(ending)
         kind = "invalid_request_error" if status == 400 else "api_error"
         return {"error": {"message": message, "type": kind, "param": None, "code": code}}
 

@@ -30,7 +30,6 @@ class AnthropicMessages(LocalServer):
 
     def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
         stop = {"length": "max_tokens", "filtered": "refusal"}.get(ending, "end_turn")
-        text = "" if ending in ("length", "filtered", "blank") else seen.reply_text
         prompt, completion = self.usage(seen)
         body = {
             "id": f"msg_{seen.sample}",
@@ -38,8 +37,8 @@ class AnthropicMessages(LocalServer):
             "role": "assistant",
             "model": seen.model,
             "content": [
-                {"type": "thinking", "thinking": "Let me see.", "signature": "c2ln"},
-                {"type": "text", "text": text},
+                {"type": "thinking", "thinking": self.think(seen), "signature": "c2ln"},
+                {"type": "text", "text": self.text(seen, ending)},
             ],
             "stop_reason": stop,
             "stop_sequence": None,
@@ -82,8 +81,7 @@ class GeminiGenerate(LocalServer):
 
     def reply(self, seen: Seen, ending: str) -> dict[str, Any]:
         finish = {"length": "MAX_TOKENS", "filtered": "SAFETY"}.get(ending, "STOP")
-        text = "" if ending in ("length", "filtered", "blank") else seen.reply_text
-        parts = [{"text": "Let me see.", "thought": True}, {"text": text}]
+        parts = [{"text": self.think(seen), "thought": True}, {"text": self.text(seen, ending)}]
         content = {"role": "model", "parts": parts}
         candidate = {"content": content, "finishReason": finish, "index": 0}
         prompt, completion = self.usage(seen)
