@@ -33,8 +33,7 @@ from phyblock.run.rescore import recorded_dataset, reopen_tracks, rescored
 from phyblock.run.store import record_lines
 from phyblock.tracks.base import simulating
 
-BUNDLE_FILE = "bundle.zip"
-"""Its name in the run's folder, unless another place is named."""
+BUNDLE_FILE = "bundle.zip"  # Its name in the run's folder, unless another place is named.
 ABOUT = "bundle.json"
 """Member with the version of phyblock that made the bundle, and digests of the others."""
 _MB = 1024 * 1024

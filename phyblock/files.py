@@ -34,12 +34,9 @@ if TYPE_CHECKING:
     from PIL.Image import Image
 
 
-LARGEST_FILE_BYTES = 64 * 1024 * 1024
-"""Default limit of a file that is read whole [bytes]."""
-LARGEST_PICTURE_BYTES = 32 * 1024 * 1024
-"""Limit of a picture file [bytes]."""
-LONGEST_INTEGER = 300
-"""Digits of an integer; a longer one fits no float."""
+LARGEST_FILE_BYTES = 64 * 1024 * 1024  # Default limit of a file that is read whole [bytes].
+LARGEST_PICTURE_BYTES = 32 * 1024 * 1024  # Limit of a picture file [bytes].
+LONGEST_INTEGER = 300  # Digits of an integer; a longer one fits no float.
 _DEEPEST_JSON = 64
 
 _PICTURE_FORMATS = ("PNG", "JPEG", "GIF", "WEBP")
@@ -290,8 +287,7 @@ def write_named(path: Path, data: bytes | Iterable[bytes]) -> None:
         atomic_write(target, itertools.chain([first], pieces))
 
 
-LIST = ".generated"
-"""The file that lists what phyblock wrote into a folder."""
+LIST = ".generated"  # The file that lists what phyblock wrote into a folder.
 _HEAD = "# Files that phyblock wrote here and may overwrite; it never touches others."
 _LINK = "cannot be written: it is a link, and links are never followed or replaced"
 _MOVE = "move it away; phyblock overwrites only its own files"

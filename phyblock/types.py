@@ -4,22 +4,17 @@ from __future__ import annotations
 
 from typing import Literal, get_args
 
-Setting = Literal["A", "B"]
-"""Setting of a comparison of blocks: A with orientation, B without."""
+Setting = Literal["A", "B"]  # Setting of a comparison of blocks: A with orientation, B without.
 SETTINGS: tuple[Setting, ...] = get_args(Setting)
 
-Matcher = Literal["optimal", "paper"]
-"""Rule that matches steps and interchangeable goal blocks."""
+Matcher = Literal["optimal", "paper"]  # Rule that matches steps and interchangeable goal blocks.
 MATCHERS: tuple[Matcher, ...] = get_args(Matcher)
 
-Level1Criterion = Literal["selection", "membership"]
-"""Criteria of Level 1 that ignore the order."""
+Level1Criterion = Literal["selection", "membership"]  # Criteria of Level 1 that ignore the order.
 LEVEL1_CRITERIA: tuple[Level1Criterion, ...] = get_args(Level1Criterion)
-Criterion = Literal["selection", "membership", "aov"]
-"""Rule by which a step counts as right."""
+Criterion = Literal["selection", "membership", "aov"]  # Rule by which a step counts as right.
 
-PlanParser = Literal["steps", "official"]
-"""Parsers of plans."""
+PlanParser = Literal["steps", "official"]  # Parsers of plans.
 
 AnswerFormat = Literal["text", "json_schema"]
 """Form of answers: lines of text, or JSON that follows a schema."""
@@ -37,26 +32,22 @@ STEP_ENDS: tuple[StepEnd, ...] = get_args(StepEnd)
 REFUSED_ENDS: tuple[StepEnd, ...] = ("overlaps", "under_floor", "no_block")
 """Endings of steps whose block is not there afterwards."""
 
-DataFormat = Literal["builtin", "official"]
-"""Layouts of data sets and question sets."""
+DataFormat = Literal["builtin", "official"]  # Layouts of data sets and question sets.
 
 Background = Literal["checkerboard", "white", "light-wood", "dark-wood", "concrete", "lawn"]
 """The six backgrounds of the paper; the checkerboard, which is dark, is the default."""
 BACKGROUNDS: list[Background] = [*get_args(Background)]
 """Those of the paper, then those that plugins add."""
-CandidateOrder = Literal["file", "shuffled"]
-"""Order in which candidates are numbered and shown."""
+CandidateOrder = Literal["file", "shuffled"]  # Order in which candidates are numbered and shown.
 
 View = Literal["oblique", "front", "side", "top"]
 """View of a scene: from a corner, along an axis, or from above."""
 
-Role = Literal["system", "user", "assistant"]
-"""Speaker of a chat message."""
+Role = Literal["system", "user", "assistant"]  # Speaker of a chat message.
 Finish = Literal["stop", "length", "refusal", "unknown"]
 """Reason why a reply ended: by itself, at the token limit, by a content filter, or unknown."""
 Outcome = Literal["ok", "parse_failure", "refusal", "truncated", "api_error", "missing"]
-OUTCOMES: tuple[Outcome, ...] = get_args(Outcome)
-"""Every outcome, in the order of columns."""
+OUTCOMES: tuple[Outcome, ...] = get_args(Outcome)  # Every outcome, in the order of columns.
 WITHOUT_REPLY: tuple[Outcome, ...] = ("api_error", "missing")
 """Outcomes of samples without a reply; a refusal is a reply."""
 BATCH_PROVIDERS = ("openai", "hosted_vllm", "anthropic", "gemini")

@@ -28,8 +28,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-INTERRUPTED = 130
-"""The exit code after Ctrl-C."""
+INTERRUPTED = 130  # The exit code after Ctrl-C.
 _PIPE_WIDTH = 160
 _TEXT_WIDTH = 24  # Characters after which a cell of text may wrap.
 
@@ -219,8 +218,7 @@ def models_option(help_text: str) -> Callable[..., Any]:
     return click.option("--models", callback=_names, metavar="A,B", help=help_text)
 
 
-NAME_OR_PATH = UserPath(path_type=str)
-"""The name of something bundled, or a path, as text."""
+NAME_OR_PATH = UserPath(path_type=str)  # The name of something bundled, or a path, as text.
 
 run_argument = click.argument("run", type=UserPath())
 models_file_option = click.option(

@@ -133,14 +133,13 @@ def run(
     with ProgressView(console) as view:
         result = completed(Session(plan, folder, view, **asks), _SIGNALS, view.tick)
     gc.freeze()
-    if result.left or not (is_as_it_was and _is_newest(folder, made)):
+    is_current = not result.left and is_as_it_was and _is_newest(folder, made)
+    if not is_current:
         show_tables(folder, page=not no_report)
-        hint = ""
-    else:
-        hint = f"phyblock report {ui.shown_path(folder)} --print shows its tables."
     code = _conclude(console, folder, result, view)
-    if hint:
-        console.print(one_line(hint), style="dim", soft_wrap=True)
+    if is_current:
+        hint = f"phyblock report {ui.shown_path(folder)} --print shows its tables."
+        console.print(hint, style="dim", soft_wrap=True)
     ui.print_path(console, made)
     return code
 
@@ -323,7 +322,10 @@ def print_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) ->
     if len(plan.variants) > 1:
         facts.append(f"{len(plan.variants):,} conditions")
     facts.append(counted(len(plan.models), "model"))
-    asked = [row for row in rows if row.model.kind == "litellm"]
+    title = f"{plan.suite.name}: {', '.join(facts)}"
+    if not (asked := [row for row in rows if row.model.kind == "litellm"]):
+        console.print(f"{title}. No call is needed.")
+        return
     columns: dict[str, Callable[[Estimate], str]] = {
         "samples": lambda row: f"{row.samples:,}",
         "done": lambda row: f"{row.done:,}",
@@ -335,9 +337,6 @@ def print_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) ->
         "cost": lambda row: _dollars(row.cost_usd) if row.calls else NO_VALUE,
         "at most": lambda row: _dollars(row.most_usd) if row.calls else NO_VALUE,
     }
-    if not asked:
-        console.print(f"{plan.suite.name}: {', '.join(facts)}. No call is needed.")
-        return
     cells = {heading: [text(row) for row in asked] for heading, text in columns.items()}
     cells = {heading: texts for heading, texts in cells.items() if set(texts) - {"0"}}
     headings = (Column("model", is_text=True), *map(Column, cells))
@@ -347,8 +346,7 @@ def print_estimate(console: Console, plan: RunPlan, rows: Sequence[Estimate]) ->
         "Tokens are estimates: texts by their words, pictures by the provider's rule, replies of "
         "usual length. At most: every reply is as long as its limit allows."
     )
-    title, notes = f"{plan.suite.name}: {', '.join(facts)}", (note,) if left else ()
-    ui.print_table(console, TextTable(title, headings, lines, notes))
+    ui.print_table(console, TextTable(title, headings, lines, (note,) if left else ()))
     known = [row.cost_usd for row in left if row.cost_usd is not None]
     costs = [f"about {_dollars(sum(known))}"] if known or not left else []
     if unknown := len(left) - len(known):

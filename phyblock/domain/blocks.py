@@ -26,17 +26,14 @@ BlockType = Literal[
 ]
 Color = Literal["red", "yellow", "blue", "green", "orange"]
 Euler = tuple[float, float, float]
-Outline = NDArray[np.float64]
-"""Corners of a polygon, shape (n, 2) [m], counter-clockwise."""
+Outline = NDArray[np.float64]  # Corners of a polygon, shape (n, 2) [m], counter-clockwise.
 
 BLOCK_TYPES: list[BlockType] = [*get_args(BlockType)]
 """Those of the paper, then those that plugins add."""
 COLORS: tuple[Color, ...] = get_args(Color)
 
-DENSITY_KG_M3 = 1040.0
-"""ABS plastic, paper appendix A.1."""
-FRICTION = 0.35
-"""Coulomb coefficient of a pair of blocks, paper appendix A.1."""
+DENSITY_KG_M3 = 1040.0  # ABS plastic, paper appendix A.1.
+FRICTION = 0.35  # Coulomb coefficient of a pair of blocks, paper appendix A.1.
 _LONG = 1.5  # A block is long if its longest side is more than this many times the second longest.
 _MOST_SEEN_TURNS = 8  # In a prism with more sides, a turn by one side can hardly be seen.
 

@@ -43,8 +43,7 @@ SUBTASK_NAMES: dict[Subtask, str] = {
     "OR": "ordering",
     "AD": "affordance",
 }
-LETTERS = "ABCD"
-"""The options of a question, in order."""
+LETTERS = "ABCD"  # The options of a question, in order.
 
 
 def add_subtask(code: str, name: str, category: Category) -> None:

@@ -126,8 +126,7 @@ class AOVGraph:
         return tuple(order)
 
 
-Kind = tuple[BlockType, Color]
-"""Key of setting B: type and color."""
+Kind = tuple[BlockType, Color]  # Key of setting B: type and color.
 Look = tuple[BlockType, Color, tuple[float, ...]]
 """Key of setting A: type, color, and orientation up to the block's own symmetry."""
 

@@ -46,12 +46,9 @@ Observation = dict[str, Any]
 Observe = Literal["pictures", "state", "text"]
 Action = Literal["block", "pose"]
 
-DONE = 0
-"""The action that ends the assembly; all others are numbers of candidates."""
-MOST_BLOCKS = 64
-"""Rows of a goal; built-in ones have 22 blocks at most."""
-TRAITS = 9
-"""Presence, type, color, three angles, three coordinates."""
+DONE = 0  # The action that ends the assembly; all others are numbers of candidates.
+MOST_BLOCKS = 64  # Rows of a goal; built-in ones have 22 blocks at most.
+TRAITS = 9  # Presence, type, color, three angles, three coordinates.
 _PICTURES = ("goal", "candidates", "current")
 """Pictures of an observation, with the names and order of the step planning prompt."""
 _KEPT_PICTURES = 64  # Cached pictures of one scene; 50 MB at 512 pixels.

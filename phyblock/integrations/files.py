@@ -27,8 +27,7 @@ from phyblock.sim.pictures import PictureStyle, candidates_png, goal_png, goal_s
 def write_scenes(folder: Path, data: str, limit: int | None) -> tuple[Path, ...]:
     """Write the scenes of a data set with their pictures; return the paths.
 
-    Raises StoreError if the folder cannot be written or a file of others would be overwritten,
-    SpecError if a package is missing, DataError for an unreadable set.
+    Raises StoreError for a folder that cannot be written, SpecError without pyarrow, DataError.
     """
 
     def row(task: Task) -> dict[str, Any]:

@@ -1,8 +1,7 @@
 """Backgrounds: the floor behind the blocks, the shadow on it, and the colors drawn over it.
 
-The floor is the plane z = 0, colored by casting a ray through every pixel. Wood, concrete and lawn
-are seamless square textures, made from integer hashes and filtered noise, and stored as mipmaps. A
-background is a row of `GROUNDS` and a name in `phyblock.types.Background`.
+The floor z = 0 is colored by a ray through every pixel. Wood, concrete and lawn are seamless
+textures of integer hashes and filtered noise, kept as mipmaps. A background is a row of `GROUNDS`.
 """
 
 from __future__ import annotations

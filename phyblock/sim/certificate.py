@@ -19,12 +19,9 @@ from typing import NamedTuple
 
 ONE = 2**40
 Vector = tuple[int, int, int]
-MARGIN = ONE * 5 // 1000
-"""Distance by which weights, and contacts of blocks, may be off [m]."""
-LITTLE, MUCH = 28, 45
-"""The least and the most friction [percent]."""
-LIGHT, HEAVY = 87, 115
-"""The least and the most mass of a long block [percent]."""
+MARGIN = ONE * 5 // 1000  # Distance by which weights, and contacts of blocks, may be off [m].
+LITTLE, MUCH = 28, 45  # The least and the most friction [percent].
+LIGHT, HEAVY = 87, 115  # The least and the most mass of a long block [percent].
 _FAR, _HALF = MARGIN * 10824 // 10000, MARGIN * 7654 // 10000
 SHIFTS = tuple(
     (x, y)

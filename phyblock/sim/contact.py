@@ -177,8 +177,7 @@ def _near_pairs(blocks: Sequence[Block], reach_m: float) -> Iterator[tuple[Block
 
 
 _KEPT_PAIRS = 1 << 16
-Turned = tuple[BlockType, Euler]
-"""A block by its type and angles, without its place."""
+Turned = tuple[BlockType, Euler]  # A block by its type and angles, without its place.
 Touch = Literal["area", "edge", "rim"]
 """Contact in an area, of an edge within a face, or of an edge on the border of a face."""
 

@@ -266,9 +266,8 @@ _DIGITS = 3
 class ExecutedStep:
     """Result of a step: the distance of the block at rest from its pose.
 
-    `gap_cm` is the gap to what is below its pose, `overlap_cm` the distance by which it was
-    moved out of others or the floor, or the depth at which it was refused; `knocked` are the
-    numbers of the steps whose blocks it moved, from 1.
+    `gap_cm` is the gap below its pose, `overlap_cm` how far it was moved out of others or the
+    floor, or how deep it was when refused; `knocked` has the steps, from 1, whose blocks it moved.
     """
 
     end: StepEnd
@@ -441,8 +440,7 @@ def _out_of_others(
     return block, float(np.linalg.norm(place - start))
 
 
-LEAN_DEG = 2.0
-"""Slope of the floor [degrees]; at the least friction, blocks begin to slide at 15."""
+LEAN_DEG = 2.0  # Slope of the floor [degrees]; at the least friction, blocks begin to slide at 15.
 _STILL_M, _STILL_DEG = 0.004, 4.0
 _MOVED_M, _MOVED_DEG = 0.02, 20.0
 _LONGEST_S = 5.0

@@ -116,8 +116,8 @@ class World(ABC):
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self._close()
+    def __exit__(self, *_: object) -> None:  # noqa: B027
+        """Free what the engine holds for this world."""
 
     def place(self, *blocks: Block) -> None:
         """Put blocks at their goal poses, at rest, rounded to digits that machines agree on."""
@@ -168,12 +168,8 @@ class World(ABC):
     def _step(self, n: int) -> None:
         """Simulate `n` time steps."""
 
-    def _close(self) -> None:  # noqa: B027
-        """Free what the engine holds for this world."""
 
-
-PhysicsEngine = type[World]
-"""The class of an engine's worlds."""
+PhysicsEngine = type[World]  # The class of an engine's worlds.
 PHYSICS_VARIABLE = "PHYBLOCK_PHYSICS"
 REFERENCE_ENGINE = "pybullet"
 """The engine of the built-in data, and of records that name no engine."""

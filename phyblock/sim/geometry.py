@@ -1,8 +1,7 @@
 """Geometry of the blocks: meshes, convex pieces, and reproducible arithmetic for pictures.
 
-The profile of a prism in `SHAPES` gives a closed triangle mesh for its inertia, a finer one for
-pictures, and the convex pieces of physics and contact tests. Curved sides are polygons: a smooth
-cylinder rolls away where an 18-gon stands. Pictures show them round.
+`SHAPES` gives each prism a closed mesh for its inertia, a finer one for pictures, and convex pieces
+for physics. Curved sides are polygons: a smooth cylinder rolls away where an 18-gon stands.
 
 A BLAS sums in another order, and with fused operations, on other machines; C libraries differ in
 the last digit of sines. Plain numpy arithmetic in 64 bits is the same everywhere, and so are

@@ -1,8 +1,7 @@
 """The pictures a model sees: goal, numbered candidates, composite; and the keys they cache under.
 
-Also pictures with scales, for plans with poses: the goal on a ruled floor, and the sheet of all
-candidates. The floor has lines every centimeter, numbers every five along the two edges next to the
-camera, and named axes; a pole at the far corner marks the height.
+Plans with poses get scales: a sheet of candidates, and the goal on a floor with lines every
+centimeter, numbers every five next to the camera, named axes, and a pole that marks the height.
 
 Pictures are drawn at twice the size and scaled down, so the rasterizer needs no anti-aliasing.
 Outlines are drawn where the face number of pixels changes. The same input gives the same bytes in

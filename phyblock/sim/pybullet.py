@@ -93,7 +93,7 @@ class BulletWorld(World):
         for _ in range(n):
             step(physicsClientId=client)
 
-    def _close(self) -> None:
+    def __exit__(self, *_: object) -> None:
         self._bullet.disconnect(self._client)
 
     def pose(self, order: int) -> Pose:

@@ -389,10 +389,9 @@ def _brightness(
 class _LightMap:
     """The picture from the light, `size_px` squared: shadows of props on props.
 
-    It stores the face nearest to the light among those that face away from it: a point behind that
-    face's plane is in shadow. So faces towards the light never shade themselves, and no bias is
-    needed (second-depth shadow mapping: Wang and Molnar 1994). Nearness is the height
-    towards the light [m]; `axes` are right, up, towards the light (world).
+    It stores the face nearest to the light among those that face away from it: points behind its
+    plane are in shadow. So lit faces never shade themselves, and no bias is needed (second-depth
+    shadow mapping: Wang and Molnar 1994). Nearness is the height towards the light [m].
     """
 
     def __init__(self, solid: _Solids, direction: Floats, size_px: int) -> None:

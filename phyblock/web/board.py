@@ -75,9 +75,8 @@ class TrackValues:
     the main measure, in its unit, by model and by scene, item, seed and variant, without samples
     that have no value; `facts` by model.
 
-    Settings are those of the run, or only "" if the track has none. Facts are those of the table of
-    coverage, None if unknown; `solved` is the number of samples with the best possible value, None
-    if there is no best; `errors` are shares of wrong steps [%].
+    Settings are those of the run, or only "". Facts are those of the table of coverage, None if
+    unknown; `solved` counts samples with the best possible value; `errors` are wrong steps [%].
     """
 
     values: Mapping[str, Mapping[tuple[str, str], Value]]
@@ -87,9 +86,7 @@ class TrackValues:
 
 @dataclass(frozen=True, eq=False)
 class SiteRun:
-    """An opened run: `where` is the path that the user gave, `sources` are the data to draw from.
-    `unverified` lists what was not checked in a bundle; None for a folder, which is not rescored.
-    """
+    """A run given as `where`; `unverified` is what was not checked of a bundle, None: a folder."""
 
     where: str
     run: Run

@@ -41,8 +41,7 @@ _LAYOUT = 7  # Version of the scripts.
 _CHUNK_CHARACTERS = 400_000
 _DIGITS = 24
 _DECIMALS = 6  # Decimals of numbers used for drawing.
-PICTURES = "report/pictures/"
-"""The folder of sent pictures in a run's folder."""
+PICTURES = "report/pictures/"  # The folder of sent pictures in a run's folder.
 _SCRIPTS = (
     *("dom.js", "data.js", "solid.js", "steps.js", "poses.js", "stage.js", "quotes.js"),
     *("sample.js", "list.js", "table.js", "charts.js", "results.js", "views.js", "app.js"),
@@ -383,10 +382,9 @@ def write_page(
 ) -> Path:
     """Write a page `name` and its data in the folder `below`/`build`/; return the page.
 
-    `make` writes the data into the given folder and returns the content of the page: `title`,
-    `description`, the address of an `image` for links to it ("" for none) and the `board`. The page
-    is written last and atomically; data of earlier builds are removed, except the `lasting` ones.
-    An earlier page that is still open says that it was written again.
+    `make` writes the data into the given folder and returns `title`, `description`, `board`, and
+    the address of an `image` for links ("" for none). The page is written last and atomically; data
+    of earlier builds are removed, except the `lasting` ones. An open earlier page says so.
     """
     own = f"{below}{build}/"
     environment = jinja2.Environment(

@@ -138,10 +138,9 @@ def write_site(
 ) -> SiteWritten:
     """Write run folders and bundles as one static folder, the same bytes for the same runs.
 
-    The page is written last and atomically, so that an interrupted build never looks like a site,
-    and an existing site stays unchanged until then. Raises SpecError for runs that cannot share a
-    table, StoreError for a path that is not a run, a bundle that does not verify, or a folder that
-    holds files of others, DataError for a bundle whose data are not found.
+    The page is written last and atomically: an interrupted build leaves an existing site as it was.
+    Raises SpecError for runs that cannot share a table, StoreError for what is no run, does not
+    verify, or files of others, DataError if a bundle's data are not found.
     """
     folder = OutFolder(out)
     folder.check([INDEX, _DATA])

@@ -14,7 +14,7 @@ import re
 import secrets
 import sys
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from socketserver import TCPServer
@@ -37,8 +37,7 @@ _PAGE = {
 }
 """Files of the page and their types, by their names below the address."""
 HOST = "127.0.0.1"
-LARGEST_BODY_BYTES = 16 * 1024
-"""Limit of a request; an answer has a few hundred bytes."""
+LARGEST_BODY_BYTES = 16 * 1024  # Limit of a request; an answer has a few hundred bytes.
 _WAIT_S = 15.0
 _POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; "
@@ -149,10 +148,8 @@ class _Handler(BaseHTTPRequestHandler):
         if (asked := self._admitted(changes=True)) is None:
             return
         length, session = self.headers.get("Content-Length", ""), self.server.session
-        actions: dict[str, Callable[[], None]] = {
-            **{"begin": session.begin, "pause": session.pause},
-            "finish": self.server.finished.set,
-        }
+        actions = {"begin": session.begin, "pause": session.pause}
+        actions["finish"] = self.server.finished.set
         if not length.isascii() or not length.isdigit():
             self._refuse(411)
         elif len(length) > 9 or int(length) > LARGEST_BODY_BYTES:
@@ -185,10 +182,7 @@ class _Handler(BaseHTTPRequestHandler):
             return None
         hosts, origin = self.headers.get_all("Host", []), self.headers.get("Origin")
         origins = [f"http://{host}" for host in self.server.hosts]
-        path, page, once = (
-            split.path.encode(),
-            *map(str.encode, (self.server.page, self.server.once)),
-        )
+        path, page, once = map(str.encode, (split.path, self.server.page, self.server.once))
         if split.netloc:
             # Full addresses are for proxies, and Python versions differ in which hosts they accept.
             self._refuse(404)
