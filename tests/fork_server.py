@@ -88,8 +88,9 @@ class Forked:
         return self
 
     def __exit__(self, *_: object) -> None:
-        with self.stdout, self.stderr:
-            self.wait()
+        self.wait()
+        self.stdout.close()
+        self.stderr.close()
 
     def poll(self) -> int | None:
         return self._process.exitcode
