@@ -1,4 +1,1 @@
-"""Making data for phyblock: scenes, candidate sets and questions, and their checks.
-
-Nothing that runs, scores or reports imports it; `phyblock scenes` and `questions` load it.
-"""
+"""Makes and checks scenes and questions; nothing that runs, scores or reports imports it."""

@@ -61,10 +61,7 @@ class SceneFacts:
 
     @cached_property
     def contacts(self) -> Mapping[int, frozenset[int]]:
-        """The orders that each block rests on, by its order; the ground only if there is no other.
-
-        Empty for a block that touches nothing below it.
-        """
+        """By order, the orders a block rests on: the ground only if alone, none if it floats."""
         graph = support_graph(self.scene.blocks)
         return {order: (below - {GROUND}) or below for order, below in graph.items()}
 

@@ -7,7 +7,7 @@ import json
 import os
 import shlex
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
 from itertools import chain, product
@@ -20,19 +20,8 @@ import numpy as np
 from click.core import ParameterSource
 from PIL import Image
 
-from phyblock.cli.console import (
-    NAME_OR_PATH,
-    UserPath,
-    jobs_option,
-    left_to_first,
-    make_console,
-    open_shards,
-    print_rows,
-    shards_folder,
-    shown_path,
-    tracked,
-    worker_options,
-)
+from phyblock.cli import console
+from phyblock.cli.console import NAME_OR_PATH, UserPath
 from phyblock.data.base import QuestionSet
 from phyblock.data.lookup import find_data_set, find_questions, read_data_set
 from phyblock.data.questions import read_questions
@@ -42,7 +31,7 @@ from phyblock.domain.scene import AssemblyTask, fingerprint
 from phyblock.errors import DataError, Problem
 from phyblock.files import OutFolder, bundled_sets, write_named
 from phyblock.making import checks, files
-from phyblock.making.questions.guesses import Probe, audit_questions
+from phyblock.making.questions.guesses import audit_questions
 from phyblock.making.questions.production import MAKERS, make_questions, problem_of
 from phyblock.making.scenes.completing import complete, read_given
 from phyblock.making.scenes.production import Production, builtin_forms, make_candidates, shares
@@ -90,27 +79,23 @@ def _several(known: Sequence[str]) -> Callable[..., tuple[str, ...]]:
 _out = click.option(
     "--out", "-o", type=UserPath(), required=True, metavar="DIR", help="Folder to write."
 )
-_seed = click.option("--seed", type=click.IntRange(0), default=0, show_default=True, metavar="S")
+_seed = click.option("--seed", type=click.IntRange(0), default=0, metavar="S")
 
 
 @contextmanager
 def _making(
-    out: Path,
-    names: Sequence[str],
-    work: str,
-    shard: tuple[int, int] | None,
-    **pool: Any,
+    out: Path, names: Sequence[str], work: str, shard: tuple[int, int] | None, **pool: Any
 ) -> Iterator[tuple[Workers, Shards | None]]:
-    """Open workers for a set with files of these names; `work` describes it.
-
-    Raises StoreError if `out` already has a set, unless shards continue in it.
+    """Open workers for a set with files of these names; `work` describes it. Raises StoreError if
+    `out` already has a set, unless shards continue in it.
     """
-    if shard is None or not shards_folder(out).exists():
+    if shard is None or not console.shards_folder(out).exists():
         files.check_out(out, names)
-    shards = open_shards(shard, out, f"{work}\n{described_engine()}\n{files.code_digest()}\n")
+    work = f"{work}\n{described_engine()}\n{files.code_digest()}\n"
     if other := other_engine():
         message = f"made with {other}: the default one may make another set of the same seed"
         click.echo(message, err=True)
+    shards = console.open_shards(shard, out, work)
     with open_workers(**pool, shards=shards) as workers:
         yield workers, shards
 
@@ -118,27 +103,26 @@ def _making(
 def _mapped(function: Callable[[T], R], items: Sequence[T], jobs: int, doing: str) -> list[R]:
     """Return the results of a function for the items, from `jobs` processes, with progress."""
     with open_workers(min(jobs, len(items) or 1)) as workers:
-        return list(tracked(workers.map(function, items), len(items), doing))
+        return list(console.tracked(workers.map(function, items), len(items), doing))
 
 
 def _conclude(
     name: str,
     headings: tuple[str, ...],
     rows: Iterable[tuple[tuple[str, ...], int, int]],
-    problems: Iterable[Problem | str],
+    problems: Sequence[Problem | str],
 ) -> None:
     """Print the table of checks, the problems and the verdict; exit with 1 if there are problems.
 
     Each row has words, the number of things that failed, and the number of all.
     """
     shown = [(*words, str(of - failed), str(of)) for words, failed, of in rows]
-    print_rows(make_console(), (*headings, "of"), shown, numbers=2)
-    failures = list(problems)
-    for failure in failures:
-        click.echo(f"failed: {failure}", err=True)
-    verdict = counted(len(failures), "failure") if failures else "all checks passed"
+    console.print_rows(console.make_console(), (*headings, "of"), shown, numbers=2)
+    for problem in problems:
+        click.echo(f"failed: {problem}", err=True)
+    verdict = counted(len(problems), "failure") if problems else "all checks passed"
     click.echo(f"{name}: {verdict}")
-    if failures:
+    if problems:
         raise click.exceptions.Exit(1)
 
 
@@ -146,19 +130,12 @@ def _conclude(
 
 
 @scenes.command("generate")
-@click.option("--count", type=click.IntRange(1), default=400, show_default=True, metavar="N")
-@click.option(
-    "--levels",
-    callback=_several(("1", "2", "3", "4", "5+")),
-    default="1,2,3,4",
-    show_default=True,
-    metavar="WORDS",
-)
+@click.option("--count", type=click.IntRange(1), default=400, metavar="N")
+@click.option("--levels", callback=_several((*"1234", "5+")), default="1,2,3,4", metavar="WORDS")
 @click.option(
     "--palette",
     type=click.Choice(["kit", "full"]),
     default="kit",
-    show_default=True,
     help=f"The kit's {len(PALETTES['kit'])} pairs of type and color, or all pairs.",
 )
 @click.option(
@@ -169,7 +146,7 @@ def _conclude(
     help="Also exclude the scenes of this set, in any colors.",
 )
 @_seed
-@worker_options()
+@console.worker_options()
 @_out
 def generate_scenes(
     count: int,
@@ -182,9 +159,8 @@ def generate_scenes(
 ) -> None:
     """Make N scenes with candidate sets, each checked by physics, and their data card.
 
-    None equals a scene of the built-in set, or of an excluded SET, even when recolored, turned,
-    mirrored or shifted. The same N, seed, levels and palette give the same files with the same
-    physics engine, on any Python, any number of processes or a cluster.
+    None equals one of the built-in set or an excluded SET, recolored, turned, mirrored or shifted.
+    The same arguments and physics engine give the same files, on any Python and with any workers.
     """
     settled = _settled(count, levels, palette, exclude)
     command = f"phyblock scenes generate {settled} --seed {seed} --out {out.name}"
@@ -194,12 +170,12 @@ def generate_scenes(
     with _making(out, files.SCENE_FILES, work, **workers_options) as (workers, shards):
         production = Production(seed, palette, workers, excluded)
         produced = production.tasks(shares(count, [int(level[0]) for level in levels]))
-        tasks = list(tracked(produced, count, "Making"))
-    if left_to_first(shards, out):
+        tasks = list(console.tracked(produced, count, "Making"))
+    if console.left_to_first(shards, out):
         return
     card = files.scene_card(out.name, tasks, command, palette, production.rejected)
     files.write_scenes(out, tasks, card)
-    click.echo(f"{counted(count, 'scene')}, all checks passed: {shown_path(out)}")
+    click.echo(f"{counted(count, 'scene')}, all checks passed: {console.shown_path(out)}")
     known = "the built-in set or an excluded one" if exclude else "the built-in set"
     click.echo(f"{counted(production.rejected, 'draft')} rejected: a scene of {known}")
 
@@ -212,9 +188,7 @@ def _settled(count: int, levels: Sequence[str], palette: str, exclude: Sequence[
 
 @scenes.command("commit")
 @click.argument("arguments", nargs=-1, metavar="-- [ARGUMENT]...")
-@click.option(
-    "--public", required=True, metavar="TEXT", help="The later public value to use, in words."
-)
+@click.option("--public", required=True, metavar="TEXT", help="The later public value, in words.")
 @_out
 def commit(arguments: tuple[str, ...], public: str, out: Path) -> None:
     """Commit to a set, given by ARGUMENTS of generate, before anyone can choose or know its seed.
@@ -223,7 +197,7 @@ def commit(arguments: tuple[str, ...], public: str, out: Path) -> None:
     secret, of phyblock's code and of the built-in scenes, and the later public value to use.
     """
     secret, commitment = files.commit_season(out, _season_arguments(arguments), public)
-    click.echo(f"publish {shown_path(commitment)}; keep {shown_path(secret)}")
+    click.echo(f"publish {console.shown_path(commitment)}; keep {console.shown_path(secret)}")
 
 
 @scenes.command("reveal")
@@ -241,9 +215,7 @@ def reveal(commitment: Path, secret: Path, public: str) -> None:
 
 
 def _season_arguments(words: Sequence[str]) -> str:
-    """Return arguments of generate in canonical form. Raises UsageError if they give a seed, a
-    folder, or a set that its maker could still change.
-    """
+    """Return arguments of generate in canonical form. Raises UsageError for those no season has."""
     context = generate_scenes.make_context("generate", ["--out", ".", *words])
     given = context.params
     if context.get_parameter_source("seed") is not ParameterSource.DEFAULT:
@@ -263,8 +235,7 @@ def _season_arguments(words: Sequence[str]) -> str:
 def compare(first: str, second: str) -> None:
     """List the scenes of the data set A that B also holds, in any colors.
 
-    Scenes are equal if turning, mirroring and shifting makes one the other, and nearly equal if
-    then only colors differ.
+    Scenes are equal also if turned, mirrored or shifted; the list says where only colors differ.
     """
     tasks, known = read_data_set(first).tasks, read_data_set(second).tasks
     rows = []
@@ -276,7 +247,8 @@ def compare(first: str, second: str) -> None:
         elif twin := nearly.get(colorless(task.scene.blocks)):
             rows.append((task.key, twin, "equal but for colors"))
     if rows:
-        print_rows(make_console(), ("scene of A", "scene of B", ""), rows, numbers=0)
+        headings = ("scene of A", "scene of B", "")
+        console.print_rows(console.make_console(), headings, rows, numbers=0)
     same = sum(how == "equal" for *_, how in rows)
     click.echo(
         f"of {counted(len(tasks), 'scene')}: {same} equal, {len(rows) - same} equal but for colors"
@@ -285,7 +257,7 @@ def compare(first: str, second: str) -> None:
 
 @scenes.command("complete")
 @click.argument("file", type=UserPath())
-@jobs_option()
+@console.jobs_option()
 @click.option("--out", "-o", type=UserPath(), help="Folder to write.  [default: NAME-set here]")
 def complete_set(file: Path, jobs: int, out: Path | None) -> None:
     """Make a data set from scenes that give type, color, position and euler of their blocks.
@@ -315,23 +287,20 @@ def complete_set(file: Path, jobs: int, out: Path | None) -> None:
         click.echo(f"note: {note}")
     for finding in checks.check_set(made):
         click.echo(f"note: scene {finding.where}: {finding.field} {finding.message}")
-    click.echo(f"{counted(len(tasks), 'scene')} completed: {shown_path(folder)}")
+    click.echo(f"{counted(len(tasks), 'scene')} completed: {console.shown_path(folder)}")
     click.echo(f"Next: phyblock run quick --set dataset.path={shlex.quote(str(folder.resolve()))}")
 
 
 @scenes.command("verify")
 @click.argument("data", metavar="[PATH]", default="phyblock-400", type=NAME_OR_PATH)
-@jobs_option()
+@console.jobs_option()
 def verify_scenes(data: str, jobs: int) -> None:
     """Check every number of every scene of PATH by geometry and physics.
 
-    PATH is a folder with scenes.jsonl, an official checkout or a bundled set, by default the
-    built-in phyblock-400. Nothing in it is changed.
-
+    PATH is a folder with scenes.jsonl, an official checkout or a bundled set [phyblock-400].
     Checks contacts, layers, overlaps, gaps, stability of the whole at two time steps and of every
-    step, candidates and duplicates. Overlaps and gaps of an official checkout may be 2 mm; all
-    other sets are also checked for sizes, hidden blocks, parents and checksums. Exits with 1 if
-    anything fails.
+    step, candidates and duplicates. Overlaps and gaps of an official checkout may be 2 mm; other
+    sets are also checked for sizes, hidden blocks, parents and checksums. Exits with 1 on failure.
     """
     where = find_data_set(data)
     is_official = not (where / SCENES_FILE).is_file()
@@ -356,12 +325,11 @@ def verify_scenes(data: str, jobs: int) -> None:
 def show_scene(data: str, scene: str) -> None:
     """Show the facts of SCENE in the data set PATH: blocks, layers, dependencies, candidates.
 
-    "on" names the blocks below, "pick" the candidate for the block, "seen" the share of it that is
-    visible in the default goal picture.
+    "on" names the blocks below, "pick" the candidate, "seen" the share visible in the goal picture.
     """
     task = read_data_set(data).task(scene)
     shown, offered = task.scene, task.candidates
-    console = make_console()
+    terminal = console.make_console()
 
     def joined(numbers: Iterable[float]) -> str:
         return " ".join(f"{number:g}" for number in numbers)
@@ -369,9 +337,9 @@ def show_scene(data: str, scene: str) -> None:
     levels, parents = " and ".join(map(str, shown.levels)), ", ".join(shown.parents)
     size = f"{counted(len(shown), 'block')} · {counted(max(shown.graph.layers), 'layer')}"
     heading = f"scene {shown.id} · level {levels} · {size} · made from {parents}"
-    console.print(heading, soft_wrap=True)
+    terminal.print(heading, soft_wrap=True)
     numbers = (f"{name} {measure(task):.3g}" for name, measure in DIFFICULTY.items())
-    console.print(f"difficulty: {' · '.join(numbers)}", soft_wrap=True)
+    terminal.print(f"difficulty: {' · '.join(numbers)}", soft_wrap=True)
     seen = pictures.visible_shares(shown, PictureStyle())
     blocks = [
         (
@@ -384,30 +352,25 @@ def show_scene(data: str, scene: str) -> None:
         for block in shown.blocks
     ]
     columns = ["block", "type", "color", "on", "position mm", "euler deg", "layer", "pick", "seen"]
-    print_rows(console, columns, blocks, numbers=3)
+    console.print_rows(terminal, columns, blocks, numbers=3)
     looks = Counter(block.look for block in shown.blocks)
     candidates = [
         (str(n), one.type, one.color, joined(one.euler_deg), str(looks[one.look] or ""))
         for n, one in enumerate(offered.candidates, 1)
     ]
     columns = ["candidate", "type", "color", "euler deg", "needed"]
-    print_rows(console, columns, candidates, numbers=1)
+    console.print_rows(terminal, columns, candidates, numbers=1)
 
 
 @scenes.command("render")
 @click.argument("data", metavar="PATH", type=NAME_OR_PATH)
 @click.argument("names", metavar="[SCENE]...", nargs=-1)
 @click.option("--out", "-o", type=UserPath(file_okay=False), required=True, metavar="DIR")
-@click.option("--view", type=click.Choice([*VIEWS, "all"]), default="oblique", show_default=True)
-@click.option(
-    "--background",
-    type=click.Choice([*BACKGROUNDS, "all"]),
-    default="checkerboard",
-    show_default=True,
-)
+@click.option("--view", type=click.Choice([*VIEWS, "all"]), default="oblique")
+@click.option("--background", type=click.Choice([*BACKGROUNDS, "all"]), default="checkerboard")
 @click.option("--composite", is_flag=True, help="Also draw goal and candidates side by side.")
 @click.option("--gif", is_flag=True, help="Also draw the assembly as an animated GIF.")
-@worker_options()
+@console.worker_options()
 def render(
     data: str,
     names: tuple[str, ...],
@@ -438,11 +401,11 @@ def render(
             drawings[f"{stem}.gif"] = partial(pictures.assembly_gif, task.scene, style)
     OutFolder(out).check(drawings)
     digest = hex_digest(repr([pictures.RENDER_VERSION, *drawings]))
-    shards = open_shards(shard, out, f"scenes render: {read.sha256} {digest}\n")
+    shards = console.open_shards(shard, out, f"scenes render: {read.sha256} {digest}\n")
     with open_workers(**pool, shards=shards) as workers:
         _draw(out, drawings, workers, shards)
-    if not left_to_first(shards, out):
-        click.echo(f"{counted(len(drawings), 'file')} in {shown_path(out)}")
+    if not console.left_to_first(shards, out):
+        click.echo(f"{counted(len(drawings), 'file')} in {console.shown_path(out)}")
 
 
 def _composite(task: AssemblyTask, style: PictureStyle) -> bytes:
@@ -451,10 +414,10 @@ def _composite(task: AssemblyTask, style: PictureStyle) -> bytes:
 
 
 def _draw(
-    out: Path, drawings: dict[str, Callable[[], bytes]], workers: Workers, shards: Shards | None
+    out: Path, drawings: Mapping[str, Callable[[], bytes]], workers: Workers, shards: Shards | None
 ) -> None:
     """Draw the named pictures, and write them if this shard is the one that writes."""
-    drawn = tracked(workers.map(call, drawings.values()), len(drawings), "Drawing")
+    drawn = console.tracked(workers.map(call, drawings.values()), len(drawings), "Drawing")
     for name, picture in zip(drawings, drawn, strict=True):
         if shards is None or shards.writes:
             OutFolder(out).write({name: picture})
@@ -468,7 +431,6 @@ _data = click.option(
     "--data",
     default="phyblock-400",
     type=NAME_OR_PATH,
-    show_default=True,
     metavar="PATH",
     help="The scenes that the questions are about: a folder or a bundled set.",
 )
@@ -480,18 +442,13 @@ def _read(path: str, data: str) -> QuestionSet:
 
 @questions.command("generate")
 @_data
+@click.option("--subtasks", callback=_several(SUBTASKS), default="all", metavar="WORDS")
 @click.option(
-    "--subtasks", callback=_several(SUBTASKS), default="all", show_default=True, metavar="WORDS"
-)
-@click.option(
-    "--per-subtask",
-    type=click.IntRange(1),
-    metavar="N",
-    help="Questions per subtask; by default 150, and 100 for PD.",
+    "--per-subtask", type=click.IntRange(1), metavar="N", help="By default 150, and 100 for PD."
 )
 @click.option("--pictures", "is_drawn", is_flag=True, help="Also draw them into DIR/pictures.")
 @_seed
-@worker_options()
+@console.worker_options()
 @_out
 def generate_questions(
     data: str,
@@ -504,8 +461,7 @@ def generate_questions(
 ) -> None:
     """Make questions with derived answers, and their data card.
 
-    The same scenes, subtasks, numbers and seed give the same files with the same physics engine,
-    on any Python, any number of processes or a cluster.
+    The same arguments and physics engine give the same files, on any Python and with any workers.
     """
     command = f"phyblock questions generate --data {data} --seed {seed} --out {out.name}"
     if len(subtasks) < len(SUBTASKS):
@@ -519,28 +475,26 @@ def generate_questions(
     work = f"{command}\n{read.sha256}"
     with _making(out, files.QUESTION_FILES, work, **workers_options) as (workers, shards):
         originals = {task.scene.id: task.scene for task in read.tasks}
-        made = make_questions(list(originals.values()), wanted, seed, workers, tracked)
-        drawings: dict[str, Callable[[], bytes]] = {
-            f"{files.PICTURES}/{question.id}-{one.label}.png": partial(
-                question_png, one, PictureStyle()
-            )
-            for question in (made if is_drawn else ())
-            for one in question.pictures
+        made = make_questions(list(originals.values()), wanted, seed, workers, console.tracked)
+        shown = [(q.id, one) for q in made if is_drawn for one in q.pictures]
+        drawings = {
+            f"{files.PICTURES}/{name}-{one.label}.png": partial(question_png, one, PictureStyle())
+            for name, one in shown
         }
         _draw(out, drawings, workers, shards)
-    if left_to_first(shards, out):
+    if console.left_to_first(shards, out):
         return
     card = files.question_card(out.name, read.name, made, command, has_pictures=is_drawn)
     files.write_questions(out, made, originals, card, list(drawings))
     outcome = f"{counted(len(made), 'question')} in {counted(len(subtasks), 'subtask')}"
     each_s = sum(os.times()[:4]) / len(made)
-    click.echo(f"{outcome}, {each_s:.1f} CPU seconds each: {shown_path(out)}")
+    click.echo(f"{outcome}, {each_s:.1f} CPU seconds each: {console.shown_path(out)}")
 
 
 @questions.command("verify")
 @_about
 @_data
-@jobs_option()
+@console.jobs_option()
 def verify_questions(path: str, data: str, jobs: int) -> None:
     """Derive every answer of PATH again, from scene, pictures and simulator.
 
@@ -564,7 +518,7 @@ def verify_questions(path: str, data: str, jobs: int) -> None:
 
 @questions.command("show")
 @click.argument("question")
-@click.option("--questions", "path", default="phyblock-vqa", type=NAME_OR_PATH, show_default=True)
+@click.option("--questions", "path", default="phyblock-vqa", type=NAME_OR_PATH)
 @_data
 @click.option("--out", type=UserPath(), metavar="FILE", help="Draw the pictures to this PNG.")
 def show_question(question: str, path: str, data: str, out: Path | None) -> None:
@@ -578,7 +532,7 @@ def show_question(question: str, path: str, data: str, out: Path | None) -> None
         hint = did_you_mean(question, by_id)
         raise DataError(Problem(str(read.root), "holds no such question", "", question, hint=hint))
     shown = by_id[question]
-    console = make_console()
+    terminal = console.make_console()
     for line in (
         f"{shown.id} · {SUBTASK_NAMES[shown.subtask]} · scene {shown.scene.id}",
         f"pictures: {', '.join(picture.label for picture in shown.pictures)}",
@@ -589,14 +543,14 @@ def show_question(question: str, path: str, data: str, out: Path | None) -> None
         f"answer: {shown.answer_letters}",
         f"evidence: {json.dumps(shown.evidence)}",
     ):
-        console.print(line, soft_wrap=True)
+        terminal.print(line, soft_wrap=True)
     if out is not None:
         pngs = (io.BytesIO(question_png(one, PictureStyle())) for one in shown.pictures)
         images = [np.asarray(Image.open(png)) for png in pngs]
         gap = np.full_like(images[0][:, :_GAP_PX], 255)
         sheet = np.hstack([part for image in images for part in (gap, image)][1:])
         write_named(out, pictures.to_png(Image.fromarray(sheet)))
-        console.print(f"pictures: {shown_path(out)}", soft_wrap=True)
+        terminal.print(f"pictures: {console.shown_path(out)}", soft_wrap=True)
 
 
 @questions.command("audit")
@@ -612,32 +566,25 @@ def audit(path: str, data: str) -> None:
     """
     asked = [task.question for task in _read(path, data).tasks]
     subtasks = len({question.subtask for question in asked})
-    audits = list(tracked(audit_questions(asked), subtasks, "Auditing"))
-
-    def shown(probe: Probe | None) -> str:
-        if probe is None:
-            return "-"
-        low, high = probe.interval
-        return f"{100 * probe.accuracy:.0f} [{100 * low:.0f}, {100 * high:.0f}]"
-
+    audits = list(console.tracked(audit_questions(asked), subtasks, "Auditing"))
     rows = [
         (
             *(one.subtask, SUBTASK_NAMES[one.subtask], str(one.n)),
             *(f"{100 * share:.0f}" for share in (*one.letters, one.chance)),
-            *(shown(one.probes.get(name)) for name in ("majority", "text", "pictures")),
+            *(str(one.probes.get(name, "-")) for name in ("majority", "text", "pictures")),
         )
         for one in audits
     ]
-    console = make_console()
+    terminal = console.make_console()
     headings = ("", "subtask", "n", *LETTERS, "chance", "majority", "texts", "pictures")
-    print_rows(console, headings, rows, numbers=9)
-    console.print(
+    console.print_rows(terminal, headings, rows, numbers=9)
+    terminal.print(
         "Percent. A to D: how often the letter is right (ordering: comes first). Probes: accuracy "
         "with a 95 % interval."
     )
     for name, probe in ((n, p) for one in audits for n, p in one.probes.items() if "," in n):
-        console.print(f"{name}: {shown(probe)} of {probe.n}")
+        terminal.print(f"{name}: {probe} of {probe.n}")
     findings = [finding for one in audits for finding in one.findings()]
     for finding in findings:
-        console.print(finding, soft_wrap=True)
-    console.print(f"{counted(len(asked), 'question')}, {counted(len(findings), 'finding')}")
+        terminal.print(finding, soft_wrap=True)
+    terminal.print(f"{counted(len(asked), 'question')}, {counted(len(findings), 'finding')}")

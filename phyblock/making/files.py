@@ -46,8 +46,8 @@ def check_out(folder: Path, names: Sequence[str]) -> None:
 def write_scenes(folder: Path, tasks: Sequence[AssemblyTask], card: str) -> None:
     """Write scenes with their candidate sets, sorted by id. Raises StoreError if that fails."""
     by_id = sorted(tasks, key=lambda task: task.key)
-    lines = (StoredScene.of(task.scene, task.candidates).as_json() for task in by_id)
-    _write(folder, SCENE_FILES, (card, "".join(f"{line}\n" for line in lines)), SCENE_SET_VERSION)
+    lines = (StoredScene.of(task.scene, task.candidates) for task in by_id)
+    _write(folder, SCENE_FILES, card, lines, SCENE_SET_VERSION)
 
 
 def write_questions(
@@ -58,22 +58,23 @@ def write_questions(
     pictures: Iterable[str] = (),
 ) -> None:
     """Write questions in order; `originals` are stored scenes, `pictures` existing file names."""
-    lines = (StoredQuestion.of(q, originals[q.scene.id]).as_json() for q in questions)
-    texts = (card, "".join(f"{line}\n" for line in lines))
-    _write(folder, QUESTION_FILES, texts, QUESTION_SET_VERSION, pictures)
+    lines = (StoredQuestion.of(q, originals[q.scene.id]) for q in questions)
+    _write(folder, QUESTION_FILES, card, lines, QUESTION_SET_VERSION, pictures)
 
 
 def _write(
     folder: Path,
     names: Sequence[str],
-    texts: tuple[str, str],
+    card: str,
+    lines: Iterable[Line],
     version: int,
     pictures: Iterable[str] = (),
 ) -> None:
+    texts = (card, "".join(f"{line.as_json()}\n" for line in lines), f"{version}\n")
     check_out(folder, names)
     files.make_folder(folder)
     with files.writing(folder):
-        for name, text in zip(names, (*texts, f"{version}\n"), strict=True):
+        for name, text in zip(names, texts, strict=True):
             files.atomic_write(folder / name, text)
         files.atomic_write(folder / SUMS_FILE, sums_text(folder, (*names, *pictures)))
 
@@ -92,10 +93,8 @@ def check_sums(folder: Path) -> tuple[int, tuple[Problem, ...]]:
     wrong = []
     for line in lines:
         digest, _, name = line.partition("  ")
-        if not (found := files.digest_of_file(folder / name)):
-            wrong.append(Problem(str(folder / name), "is missing"))
-        elif found != digest:
-            message = f"differs from its checksum in {SUMS_FILE}"
+        if (found := files.digest_of_file(folder / name)) != digest:
+            message = f"differs from its checksum in {SUMS_FILE}" if found else "is missing"
             wrong.append(Problem(str(folder / name), message))
     return len(lines), tuple(wrong)
 
@@ -109,9 +108,8 @@ def card(template: str, /, **facts: object) -> str:
     environment = Environment(
         loader=loader, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
-    return (
-        environment.get_template(f"{template}.md").render(simulator=other_engine(), **facts) + "\n"
-    )
+    text = environment.get_template(f"{template}.md").render(simulator=other_engine(), **facts)
+    return f"{text}\n"
 
 
 def scene_card(

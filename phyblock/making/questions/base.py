@@ -1,8 +1,7 @@
 """The base of all kinds of questions: a maker proposes questions and derives their answers again.
 
-`StaticMaker.right` and `Maker.answer` are the only places that decide what is right and what is
-fair: a draft is kept if they find its first option, and `phyblock questions verify` calls them
-again for every stored question.
+`StaticMaker.right` and `Maker.answer` alone decide what is right and what is fair: a draft is kept
+if they find its first option, and `phyblock questions verify` calls them for every stored question.
 """
 
 from __future__ import annotations
@@ -50,12 +49,11 @@ class Draft:
     """A question whose options have no letters yet.
 
     `scene` is the scene as shown. `options` has the right one first, or for ordering all four in
-    the right order; those of a `StaticMaker` are in any order until it finds the right one, and
-    may be missing until then. `slots` fill the template of the `wording`. `facts` are further
-    evidence, which JSON can hold. Selection takes an even share of each `kind`, by default the
-    wording. `looks` are measures of the pictures, a row for each option, by which a reader might
-    guess: drafts are dropped until these reveal nothing. The same base scenes have at most one
-    question with the same wording, slots and `about`.
+    the right order; a `StaticMaker` may list them in any order, or leave them to `offer`. `slots`
+    fill the template of the `wording`. `facts` are further evidence, which JSON can hold. Selection
+    takes an even share of each `kind`, by default the wording. `looks` are measures of the
+    pictures, a row for each option, by which a reader might guess: drafts are dropped until these
+    reveal nothing. Base scenes have at most one question with the same wording, slots and `about`.
     """
 
     wording: str
@@ -109,17 +107,13 @@ class Maker(ABC):
 
     @abstractmethod
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
-        """Propose questions about a scene, in an order drawn with `rng`, without a simulation.
-
-        A draft is kept if it is selected and `answer` finds its answer.
-        """
+        """Propose questions about a scene, in random order and without simulations."""
 
     @abstractmethod
     def answer(self, asked: Draft) -> tuple[int, ...]:
-        """Return the indices of the right option, or of all in the right order, derived again from
-        scene, pictures, slots and simulator. The options are as in the question, texts or pictures.
-
-        Raises UnfairError if there is not exactly one, or something named cannot be seen.
+        """Return the index of the right option, or all in the right order, derived from the scene,
+        pictures, slots, options and simulations. Raises UnfairError unless there is exactly one
+        and all that is named can be seen.
         """
 
 
@@ -160,7 +154,8 @@ class StaticMaker(Maker):
                 if right not in options:
                     continue
                 shown = replace(scene, blocks=asked.picture.blocks[: len(scene)])
-                yield replace(asked, scene=shown, options=tuple(right_first(right, options)))
+                wrong = (option for option in options if option != right)
+                yield replace(asked, scene=shown, options=(right, *wrong))
                 found += 1
                 if found == _DRAFTS_A_VIEW:
                     break
@@ -206,11 +201,6 @@ def only_index(right: Sequence[bool | None]) -> tuple[int]:
     if len(found) != 1:
         raise UnfairError(f"{len(found)} of {len(right)} options are right")
     return (found[0],)
-
-
-def right_first(right: T, options: Sequence[T]) -> list[T]:
-    """Return the options with the right one at the front."""
-    return [right, *(option for option in options if option != right)]
 
 
 def window(rng: np.random.Generator, values: Sequence[int], right: int) -> list[str]:

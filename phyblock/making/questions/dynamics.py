@@ -1,9 +1,8 @@
 """CF, PD, AD: effects of removing or adding blocks.
 
 Questions are proposed by statics alone; simulations confirm those that are selected. The block that
-CF removes is marked in the picture, so that no word of the question hints at the answer. The right
-options of PD and AD have each rank about equally often in the measures that someone might go by
-(`four_plans`, `four_of`).
+CF removes is marked in the picture, so that no word hints at the answer. The right options of PD
+and AD have each rank about equally often in measures to guess by (`four_plans`, `four_of`).
 """
 
 from __future__ import annotations
@@ -24,17 +23,10 @@ from phyblock.domain.scene import Block, Scene
 from phyblock.making.questions import base, sight
 from phyblock.making.questions.base import Draft, Floats, Maker, Slots, UnfairError, pick, shuffled
 from phyblock.making.scenes.sketch import lowered
+from phyblock.sim import contact
 from phyblock.sim import question_pictures as drawn
 from phyblock.sim.balance import MARGIN_M, is_balanced, surely_falls, surely_stands
-from phyblock.sim.contact import (
-    GROUND,
-    Turned,
-    bounds_m,
-    find_overlaps,
-    support_graph,
-    whole_bounds_m,
-)
-from phyblock.sim.contact import at as at_place
+from phyblock.sim.contact import GROUND, Turned, bounds_m, support_graph
 from phyblock.sim.dynamics import LEAN_DEG, after_removal, groups, holds
 from phyblock.sim.geometry import corners_m
 from phyblock.sim.question_pictures import is_inside, mark_pixel, seen, shown_pixels
@@ -55,7 +47,7 @@ _DIRECTIONS = 8
 
 def new_block(pose: Turned, order: int, rng: np.random.Generator) -> Block:
     """Return a block of a random color in a pose, at the origin."""
-    return replace(at_place(pose), order=order, color=pick(rng, COLORS))
+    return replace(contact.at(pose), order=order, color=pick(rng, COLORS))
 
 
 def lowered_round(put: Block, onto: Sequence[Block], radius_m: float) -> Iterator[Block]:
@@ -96,10 +88,9 @@ def is_sure(left: Sequence[Block], moved: Collection[int]) -> bool:
     weight 5 mm off to any side, other masses, and friction to spare.
     """
     still = [block for block in left if block.order not in moved]
-    falling = sight.lots_of([block for block in left if block.order in moved])
-    return all(surely_stands(group) for group in groups(still)) and all(
-        surely_falls([*still, *lot]) for lot in falling
-    )
+    lots = sight.lots_of([block for block in left if block.order in moved])
+    falls = (surely_falls([*still, *lot]) for lot in lots)
+    return all(map(surely_stands, groups(still))) and all(falls)
 
 
 def resting_on(blocks: Sequence[Block], order: int, *, only: bool = False) -> Lot:
@@ -157,8 +148,8 @@ class CounterfactualMaker(Maker):
             if moved is None or not sight.are_seen(shown, sight.COUNTED, moved):
                 continue
             facts = {"removed": order, "moved": sorted(moved)}
-            right, *others = base.right_first(_outcome_text(len(moved)), OUTCOME_TEXTS)
-            options = (right, *shuffled(rng, others))
+            right = _outcome_text(len(moved))
+            options = (right, *shuffled(rng, [text for text in OUTCOME_TEXTS if text != right]))
             yield Draft("cf-count", scene, (shown,), {}, options, facts=facts, about=order)
             slots, pictures = _by_colors(shown, order, moved, rng)
             if pictures:
@@ -293,7 +284,7 @@ class Bench(NamedTuple):
             x, y = (float(middle[i]) + (off_m if i == self.along else 0.0) for i in (0, 1))
             onto = blocks[len(self.base) :][:1] or [self.top]
             blocks = (*blocks, lowered(block, onto, x, y))
-        return None if find_overlaps(blocks) else blocks
+        return None if contact.find_overlaps(blocks) else blocks
 
     @property
     def limits_m(self) -> tuple[float, float]:
@@ -304,14 +295,12 @@ class Bench(NamedTuple):
     @property
     def middle_m(self) -> float:
         """Offset of the middle of the structure [m]."""
-        ends = np.array([bounds_m(block)[:, self.along] for block in self.base])
-        top = bounds_m(self.top)[:, self.along]
-        return float((ends.min() + ends.max()) / 2 - top.mean())
+        middle = contact.whole_bounds_m(self.base).mean(axis=0) - bounds_m(self.top).mean(axis=0)
+        return float(middle[self.along])
 
     def plans_m(self, count: int, rng: np.random.Generator) -> Floats:
-        """Return random offsets of loose blocks, (plans, blocks) [m].
-
-        `count` plans are drawn, and those with two weights in one place are left out.
+        """Return random offsets of loose blocks, (plans, blocks) [m]: of `count` plans, those whose
+        weights are apart.
         """
         plank_m, *weights_m = (np.ptp(bounds_m(one)[:, self.along]) for one in self.loose)
         half = int(plank_m / UNIT_M / 2)
@@ -387,8 +376,6 @@ _LEANS = ((_LEAN, 0.0), (-_LEAN, 0.0), (0.0, _LEAN), (0.0, -_LEAN))
 _PLANS, _FOURS = 400, 4000
 _OVER = (0, 1, 1, 2, 2, 2)
 """Wanted ranks of the right plank's overhang; the higher, the harder it is to find."""
-Ranks = tuple[int, int]
-"""The number of other options below the right one, in two measures."""
 
 
 class PredictiveMaker(Maker):
@@ -420,7 +407,7 @@ class PredictiveMaker(Maker):
         return base.only_index(stays)
 
 
-def _next_steps(scene: Scene, ranks: Ranks, rng: np.random.Generator) -> Draft | None:
+def _next_steps(scene: Scene, ranks: tuple[int, int], rng: np.random.Generator) -> Draft | None:
     """Return a question about a bench on a nearly finished scene, or None if none was found."""
     order = scene.graph.random_order(rng)
     kept = len(order) - int(rng.integers(min(_MOST_LEFT_OUT, max(len(order) - 2, 0)) + 1))
@@ -451,7 +438,7 @@ def _next_steps(scene: Scene, ranks: Ranks, rng: np.random.Generator) -> Draft |
     return None
 
 
-def four_plans(on: Bench, ranks: Ranks, rng: np.random.Generator) -> list[list[float]]:
+def four_plans(on: Bench, ranks: tuple[int, int], rng: np.random.Generator) -> list[list[float]]:
     """Return four plans or none: only the first has its center of mass over the support, clearly.
 
     Its `ranks` are by the plank's overhang, and how far the center of mass is from the middle.
@@ -488,8 +475,7 @@ def ranks_of(fours: Floats) -> Ints:
 Place = tuple[float, float, float]
 """A point of the world [m]."""
 STAYS, IN_THE_WAY, TIPS = range(1, 4)
-"""Outcomes of setting a block down: it stays; it lands on a neighbor first and tips off that; it
-tips the block that it is set on."""
+"""Outcomes for a block set down: it stays, tips off a higher neighbor, or tips its support."""
 _PLACE_RING_M, _WIDE_RING_M = 0.005, 0.01
 """Distances around a place at which its verdict holds, too: in answers and in proposals [m]."""
 _STRUCTURES_TRIED, _AREA_M2, _ROUND_PX = 60, 0.0003, 2
@@ -554,7 +540,7 @@ def _set_down(scene: Scene, rank: int, rng: np.random.Generator) -> Draft | None
     # overhang a single pillar do so along the axis that runs across the view.
     count, more = int(rng.integers(2, _MOST_OF_SCENE + 1)), int(rng.integers(*_ADDED))
     blocks = tuple(scene.blocks[i] for i in sorted(scene.graph.random_order(rng)[:count]))
-    low, high = whole_bounds_m(blocks)[:, :2]
+    low, high = contact.whole_bounds_m(blocks)[:, :2]
     order = max(sight.orders_of(scene.blocks)) + 1
     for side in shuffled(rng, _SIDES_OF_SCENE):
         if len(blocks) < count + more:
@@ -594,7 +580,7 @@ def _with_plank(
     parts: list[tuple[Turned, Floats]] = [*((pillar, one) for one in on_m), (plank, at_m)]
     for _ in range(int(rng.integers(*_BESIDE))):
         other = pick(rng, WEIGHTS)
-        sizes = [np.ptp(bounds_m(at_place(one)), axis=0)[:2] for one in (plank, other)]
+        sizes = [np.ptp(bounds_m(contact.at(one)), axis=0)[:2] for one in (plank, other)]
         off_m = (sizes[0] + sizes[1]) / 2 + pick(rng, _GAPS_M)
         off_m[int(rng.integers(2))] *= rng.random()
         beside_m = at_m + off_m * rng.choice((-1, 1), size=2)
@@ -739,9 +725,8 @@ def _size(block: Block) -> str:
 
 @functools.lru_cache(maxsize=64)
 def stays_at(plain: QuestionPicture, block: Block, at: Place) -> bool | None:
-    """True if the block stays at a place, by simulation too, and by statics 5 mm around it.
-
-    None if that is not sure, or if it stays on something other than the marked block.
+    """True if the block stays at a place by simulation, and 5 mm around it by statics; None if that
+    is not sure, or if it stays on something other than the marked block.
     """
     put = lowered(block, plain.blocks, *at[:2])
     stays = stays_round(put, plain.blocks, _PLACE_RING_M)

@@ -3,19 +3,18 @@
 Texts have words and numbers, pictures have simple measures. Drafts are dropped until these reveal
 nothing (`keeping_odds`). The audit of a set looks at the balance of answers and at repeated
 questions, and has two probes that learn from questions about other base scenes and answer the rest:
-one reads only the texts (logistic regression over words, numbers and likeness), one measures the
-pictures without knowing what is in them (ridge regression): outlines, colors by height, what an
-option changes and whether something is below that, where marks are. If either is right much more
-often than chance, the set gives its answers away.
+one reads only texts (logistic regression over words, numbers and likeness), one measures pictures
+(ridge regression): outlines, colors by height, what an option changes and whether something is
+below that, where marks are. If either is much better than chance, the set gives answers away.
 """
 
 from __future__ import annotations
 
+import functools
 import itertools
-import math
 import re
 from collections import Counter
-from collections.abc import Hashable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -28,7 +27,7 @@ from phyblock.making.questions.base import BALANCE, Draft, Floats
 from phyblock.sim.pictures import PictureStyle, Shot
 from phyblock.sim.question_pictures import SEEN_PX, changed_pixels, mark_pixel, question_key, seen
 from phyblock.text import plain_sum
-from phyblock.tracks.questions import FOLDS, Folds, Rule, guesses_of, majority_rule
+from phyblock.tracks.questions import Rule, guesses_of, majority_rule
 
 Mask = NDArray[np.bool_]
 _BELOW_PX, _BANDS, _CROSSED = 3, 6, 0.25
@@ -266,10 +265,14 @@ class Probe(NamedTuple):
     @property
     def interval(self) -> tuple[float, float]:
         """Wilson score interval of 95 %."""
-        z, n, p = 1.96, self.n, self.accuracy
-        middle = (p + z * z / (2 * n)) / (1 + z * z / n)
-        half = z / (1 + z * z / n) * math.sqrt(p * (1 - p) / n + z * z / (4 * n * n))
-        return middle - half, middle + half
+        from scipy.stats import binomtest  # type: ignore[import-untyped]
+
+        low, high = binomtest(self.right, self.n).proportion_ci(method="wilson")
+        return float(low), float(high)
+
+    def __str__(self) -> str:
+        low, high = self.interval
+        return f"{100 * self.accuracy:.0f} [{100 * low:.0f}, {100 * high:.0f}]"
 
 
 @dataclass(frozen=True)
@@ -278,8 +281,7 @@ class SubtaskAudit:
 
     `letters` are shares of right answers by letter (ordering: by the letter that comes first),
     `repeats` the questions that ask the same as an earlier one. `probes` are `majority`, `text`
-    and, if options are pictures, places or effects of removing a marked block, `pictures`, which is
-    also reported by kind of question.
+    and, for questions whose pictures have measures, `pictures`, also by kind if there are several.
     """
 
     subtask: Subtask
@@ -302,40 +304,36 @@ class SubtaskAudit:
 
 def audit_questions(questions: Sequence[Question]) -> Iterator[SubtaskAudit]:
     """Yield subtasks' audits in the paper's order. Raises SpecError without scikit-learn."""
-    folds = Folds(questions)
-    rules = {"majority": majority_rule, "text": text_rule}
-    readers = {name: guesses_of(questions, rule) for name, rule in rules.items()}
+    by_id = {question.id: question for question in questions}
+    measures = functools.cache(lambda name: measures_of(by_id[name]))
+    learned_by = {"majority": majority_rule, "text": text_rule}
+    learned_by["pictures"] = functools.partial(picture_rule, measures=measures)
+    rules = {name: guesses_of(questions, learn) for name, learn in learned_by.items()}
     repeated = duplicates_of(questions)
     for subtask in SUBTASKS:
         mine = [question for question in questions if question.subtask == subtask]
         if not mine:
             continue
         n, first = len(mine), Counter(question.answer[0] for question in mine)
-        probes = {
-            name: Probe(sum(guesses(q) == q.answer for q in mine), n)
-            for name, guesses in readers.items()
-        }
-        by_kind = picture_probe(mine, folds)
-        if by_kind:
-            right, shown = (sum(counts) for counts in zip(*by_kind.values(), strict=True))
-            probes["pictures"] = Probe(right, shown)
-        if len(by_kind) > 1:
-            probes |= {f"pictures, {kind}": probe for kind, probe in by_kind.items()}
-        chances = [1 / math.factorial(4) if subtask == "OR" else 1 / len(q.options) for q in mine]
-        yield SubtaskAudit(
-            subtask=subtask,
-            n=n,
-            letters=tuple(first[i] / n for i in range(len(LETTERS))),
-            chance=math.fsum(chances) / n,
-            probes=probes,
-            repeats=tuple(q.id for q in mine if q.id in repeated),
-        )
+        asked = [(name, name, mine) for name in rules]
+        for kind in dict.fromkeys(question.wording for question in mine):
+            some = [question for question in mine if question.wording == kind]
+            if len(some) < n:
+                asked.append(("pictures", f"pictures, {kind}", some))
+        probes = {}
+        for rule, name, some in asked:
+            guesses = [(rules[rule](question), question.answer) for question in some]
+            if answered := [guess == answer for guess, answer in guesses if guess]:
+                probes[name] = Probe(sum(answered), len(answered))
+        letters = tuple(first[i] / n for i in range(len(LETTERS)))
+        chance = 1 / 24 if subtask == "OR" else 1 / len(LETTERS)
+        repeats = tuple(question.id for question in mine if question.id in repeated)
+        yield SubtaskAudit(subtask, n, letters, chance, probes, repeats)
 
 
 def text_rule(known: Sequence[Question]) -> Rule:
-    """Return the rule that picks the likeliest option by logistic regression over its words.
-
-    For an order, it picks the most frequent one. Raises SpecError without scikit-learn.
+    """Return the rule that picks the likeliest option by logistic regression over its words, or the
+    most frequent order. Raises SpecError without scikit-learn.
     """
     majority = majority_rule(known)
     single = [question for question in known if len(question.answer) == 1]
@@ -364,6 +362,38 @@ def text_rule(known: Sequence[Question]) -> Rule:
     return guess
 
 
+def picture_rule(known: Sequence[Question], measures: Callable[[str], Floats]) -> Rule:
+    """Return the rule that ranks options by measures of their pictures, which it gets by id.
+
+    Ridge regression of being right (ordering: of the place in the order), learned from questions
+    with the same wording. Without measures, or with few known questions, the guess is empty.
+    """
+
+    @functools.cache
+    def weights(wording: str) -> Floats | None:
+        alike = [q for q in known if q.wording == wording and len(measures(q.id))]
+        if len(alike) < _FEWEST:
+            return None
+        # Measures and values have a mean of zero over the four options. The right one has the
+        # highest value, or in an order the first one.
+        rows, values = np.vstack([measures(q.id) for q in alike]), np.zeros((len(alike), 4))
+        for value, q in zip(values, alike, strict=True):
+            value[list(q.answer)] = np.arange(len(q.answer), 0, -1)
+        worth = (values - values.mean(axis=1, keepdims=True)).ravel()
+        gram = rows.T @ rows + _RIDGE * np.eye(rows.shape[1])
+        return np.asarray(np.linalg.solve(gram, rows.T @ worth))
+
+    def guess(question: Question) -> tuple[int, ...]:
+        rows = measures(question.id)
+        learned = weights(question.wording) if len(rows) else None
+        if learned is None:
+            return ()
+        order = np.argsort(-(rows @ learned), kind="stable")
+        return tuple(order[: len(question.answer)].tolist())
+
+    return guess
+
+
 def duplicates_of(questions: Sequence[Question]) -> dict[str, str]:
     """Return the ids of questions that repeat an earlier one, each with the id of that one.
 
@@ -384,41 +414,4 @@ def duplicates_of(questions: Sequence[Question]) -> dict[str, str]:
         seen = (question.subtask, question.text, tuple(sorted(options)), tuple(shown.values()))
         if (twin := first.setdefault(seen, question.id)) != question.id:
             found[question.id] = twin
-    return found
-
-
-def picture_probe(questions: Sequence[Question], folds: Folds) -> dict[str, Probe]:
-    """Answer questions by measures of their pictures alone, and return a probe for each kind.
-
-    Ridge regression of being right (ordering: of the place in the order), learned from questions
-    of the same kind that share no base scene. Kinds without measures are omitted.
-    """
-    rows_of = {q.id: measures_of(q) for q in questions}
-    kinds: dict[str, list[Question]] = {}
-    for question in questions:
-        if len(rows_of[question.id]):
-            kinds.setdefault(question.wording.rstrip("-0123456789"), []).append(question)
-    found: dict[str, Probe] = {}
-    for kind, members in kinds.items():
-        right = n = 0
-        for fold in range(FOLDS):
-            held_out = [q for q in members if folds.of(q) == fold]
-            known = [q for q in members if folds.is_known(fold, q)]
-            if not held_out or len(known) < _FEWEST:
-                continue
-            # Measures and values have a mean of zero over the four options. The right one has the
-            # highest value, or in an order the first one.
-            rows = np.vstack([rows_of[q.id] for q in known])
-            values = np.zeros((len(known), len(LETTERS)))
-            for value, q in zip(values, known, strict=True):
-                value[list(q.answer)] = np.arange(len(q.answer), 0, -1)
-            worth = (values - values.mean(axis=1, keepdims=True)).ravel()
-            gram = rows.T @ rows + _RIDGE * np.eye(rows.shape[1])
-            weights = np.linalg.solve(gram, rows.T @ worth)
-            for question in held_out:
-                order = np.argsort(-(rows_of[question.id] @ weights), kind="stable")
-                right += tuple(order[: len(question.answer)]) == question.answer
-                n += 1
-        if n:
-            found[kind] = Probe(right, n)
     return found

@@ -3,10 +3,9 @@
 Answers are random; what a reader sees beside them is balanced. Drafts of each kind are taken from
 all scenes in turn, so that no scene dominates. Some of these are dropped at random until texts
 and simple measures of the others reveal nothing (`keeping_odds`). From those, a greedy selection
-takes the one of a hundred or so at a time that best balances those taken so far. For options that
-are texts it considers only kind and set of options: selecting by scene as well would select
-answers, since large scenes have larger numbers, and balancing answers would make those that are
-often right in some questions rare in others.
+takes the one of a hundred or so at a time that best balances those taken so far. Where options are
+texts, it balances only kinds and sets of options: by scene, it would select answers, since large
+scenes have larger numbers; by answer, those often right in some questions would be rare in others.
 """
 
 from __future__ import annotations
@@ -245,8 +244,7 @@ def _identities(draft: Draft) -> list[Hashable]:
 def even_letters(count: int, rng: np.random.Generator) -> list[int]:
     """Return indices of the letters that are right, each share within `BALANCE`.
 
-    For few questions, shares may be just outside. With exactly equal shares, the letters of some
-    questions would reveal those of the others.
+    Few questions may be just outside. If all shares were equal, some letters would reveal others.
     """
     # Rounded, since 0.28 of 150 is a little more than 42 in floating point.
     low, high = (round(share * count, 6) for share in BALANCE)

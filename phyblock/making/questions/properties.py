@@ -293,9 +293,8 @@ class TallyMaker(StaticMaker):
         for stem, tally in base.shuffled(rng, [*self._tallies.items()]):
             picture, kind = colored if tally.is_recolored else plain, ""
             if stem == "oc-hidden":
-                kind = (
-                    f"{stem}-{sum(x < sight.COUNTED for x in sight.sizes(picture).shown.values())}"
-                )
+                shares = sight.sizes(picture).shown.values()
+                kind = f"{stem}-{sum(share < sight.COUNTED for share in shares)}"
             if texts := tally.slots(picture):
                 yield Draft(stem, scene, (picture,), pick(rng, texts), kind=kind)
 

@@ -65,8 +65,7 @@ _RANKED: Mapping[str, Callable[[Block, Floats], float]] = {
     "rp-front": lambda block, away: float(sight.center_m(block) @ away),
     "rp-back": lambda block, away: -float(sight.center_m(block) @ away),
 }
-"""Measures of the blocks that are asked for, from a block and the direction away from the viewer;
-the least is right."""
+"""Measures of which the least is right, from a block and the direction away from the viewer."""
 
 
 class PositionMaker(StaticMaker):
@@ -288,9 +287,8 @@ def images(stem: str, block: Block) -> Sequence[tuple[str, Euler]]:
 
 
 def phrases(stem: str, block: Block, other: Block) -> Collection[str]:
-    """Return the phrases that are true of a block's rotation compared with another of its type.
-
-    Empty if its type differs or does not fit the wording. Raises UnfairError as `images`.
+    """Return the phrases that are true of a block's rotation compared with another's; none if types
+    differ or do not fit the wording. Raises UnfairError as `images`.
     """
     if block.type != other.type or (stem == "rr-axis" and not SHAPES[block.type].is_long):
         return ()
@@ -348,9 +346,8 @@ class RotationMaker(StaticMaker):
 
 
 def put_beside(block: Block, blocks: Sequence[Block], rng: np.random.Generator) -> Block:
-    """Put the block, in its orientation, on the ground in a random direction from the others.
-
-    It gets an unused order, and is as near to the other blocks as leaves 2 cm free.
+    """Put the block, with an unused order, on the ground in a random direction from the others, as
+    near to them as leaves 2 cm free. Its orientation stays.
     """
     middle = whole_bounds_m(blocks).mean(axis=0)
     angle = float(rng.uniform(0, 2 * math.pi))

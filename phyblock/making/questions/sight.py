@@ -46,10 +46,8 @@ PLAIN_COLORS: tuple[Color, ...] = ("red", "yellow", "blue")
 
 
 def palette(rng: np.random.Generator) -> list[Color]:
-    """Return three colors, in random order, that everybody can tell apart: any two differ by at
-    least 20 in CIELAB, also for people who are blind to red or green.
-
-    So at most one of red, orange and green is possible, and green is too close to yellow.
+    """Return three colors in random order, any two 20 or more apart in CIELAB, also for people who
+    are blind to red or green. So one is red or orange; green is too close to them and to yellow.
     """
     return base.shuffled(rng, (base.pick(rng, ("red", "orange")), *PLAIN_COLORS[1:]))
 
@@ -203,10 +201,7 @@ def require_shapes_seen(picture: QuestionPicture) -> Sequence[Block]:
 
 
 def outermost(blocks: Sequence[Block], picture: QuestionPicture, to_left: bool) -> Block | None:
-    """Return the block that is farthest to a side of a picture, or None if it is too close to call.
-
-    Both its middle and its outer edge have to be clearly farther out than those of the others.
-    """
+    """Return the block whose middle and outer edge are clearly farthest to a side, or None."""
     spans, sign = sizes(picture).ends, -1.0 if to_left else 1.0
     ends = {b.order: [sign * end for end in spans[b.order]] for b in blocks}
     first, *others = sorted(blocks, key=lambda block: -sum(ends[block.order]))
@@ -300,10 +295,9 @@ def shape_word(block_type: BlockType) -> str:
 def resolve(text: str, picture: QuestionPicture, loosely: bool = False) -> tuple[int, ...]:
     """Return the orders of the blocks in the picture that an expression fits.
 
-    Empty if it is too close to call: two blocks about equally far to the left, or two blocks of
-    that color and type in one layer. If it is read `loosely`, as by someone who mistakes cubes for
-    short rectangular prisms, half cylinders for cylinders, or vice versa, look-alikes fit as well.
-    Raises UnfairError for words that are no expression.
+    Empty if it is too close to call: two blocks about equally far to the left, or two of that color
+    and type in one layer. Read `loosely`, look-alikes fit too: short rectangular prisms for cubes,
+    cylinders for half cylinders, and vice versa. Raises UnfairError for words that name no block.
     """
     match = _PATTERN.fullmatch(text.removeprefix("the "))
     if match is None:
@@ -342,9 +336,8 @@ def resolve(text: str, picture: QuestionPicture, loosely: bool = False) -> tuple
 def resolve_seen(
     texts: Sequence[str], picture: QuestionPicture, least: float = NAMED
 ) -> list[Block]:
-    """Return the only block that each expression fits, even loosely.
-
-    Raises UnfairError if there is none or another, or less than this share of one is visible.
+    """Return the only block that each expression fits, even loosely. Raises UnfairError if there is
+    none or another, or less than this share of one is visible.
     """
     blocks = []
     for text in texts:

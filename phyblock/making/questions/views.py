@@ -135,10 +135,8 @@ class OrderingMaker(Maker):
 
     def drafts(self, scene: Scene, rng: np.random.Generator) -> Iterator[Draft]:
         """Propose questions, of either kind, from views of a structure that show every block."""
-        views = [
-            base.drawn_view(rng) for _ in range(_VIEWS_TRIED if len(scene) >= _LEAST_BLOCKS else 0)
-        ]
-        for view in views:
+        tries = _VIEWS_TRIED if len(scene) >= _LEAST_BLOCKS else 0
+        for view in [base.drawn_view(rng) for _ in range(tries)]:
             plain = QuestionPicture("scene", scene.blocks, view, framed=scene.blocks)
             if not sight.are_seen(plain, sight.COUNTED):
                 continue

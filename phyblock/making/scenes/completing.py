@@ -59,24 +59,22 @@ def complete(read: tuple[GivenScene, str]) -> Completed:
     """
     given, where = read
     try:
-        scene = derived(given, where)
-    except DataError as error:
-        return Completed(problems=tuple(error.problems))
+        scene = derived(given)
+    except CycleError as error:
+        cycle = " -> ".join(str(v + 1) for v in (*error.vertices, error.vertices[0]))
+        message = f"scene {given.id}: blocks rest on one another in a circle"
+        return Completed(problems=(Problem(where, message, "blocks", cycle),))
     offered = None if given.candidates is None else stored.candidate_set(given.candidates)
     facts = SceneFacts(scene, offered)
     # Blocks that overlap or float fall as well: only the cause is reported.
     found = [*findings_of(facts, ("overlap", "floating", "candidates"))]
     found = found or [*findings_of(facts, ("unstable step", "unstable"))]
     reorder = "list blocks so that each can be placed, and stands, after those before it"
-    problems = [
-        replace(
-            one,
-            where=where,
-            message=f"scene {scene.id}: {one.message}",
-            hint=reorder if one.check == "unstable step" else "",
-        )
-        for one in found
-    ]
+    problems = []
+    for one in found:
+        hint = reorder if one.check == "unstable step" else ""
+        message = f"scene {scene.id}: {one.message}"
+        problems.append(replace(one, where=where, message=message, hint=hint))
     noted = () if found else findings_of(facts, ("size", "hidden"))
     notes = [
         f"scene {scene.id}: {', '.join(filter(None, (one.message, one.found, one.allowed)))}"
@@ -85,9 +83,9 @@ def complete(read: tuple[GivenScene, str]) -> Completed:
     return Completed(scene, offered, tuple(notes), tuple(problems))
 
 
-def derived(given: GivenScene, where: str) -> Scene:
+def derived(given: GivenScene) -> Scene:
     """Return the scene that blocks form at their poses, numbered as they are listed, each after
-    those that it rests on. Raises DataError if contacts allow no order.
+    those that it rests on. Raises CycleError, by places in the list, if contacts allow no order.
     """
     blocks = [
         Block(number, one.type, one.color, one.position, one.euler, (), 1)
@@ -95,12 +93,7 @@ def derived(given: GivenScene, where: str) -> Scene:
     ]
     fitting = (n for n in LEVEL_LIMITS if n > 1 and len(blocks) <= LEVEL_LIMITS[n].most_blocks)
     levels = given.levels or (next(fitting, max(LEVEL_LIMITS)),)
-    try:
-        graph = scene_of(given.id, levels, blocks).graph
-    except CycleError as error:
-        cycle = " -> ".join(str(v + 1) for v in (*error.vertices, error.vertices[0]))
-        message = f"scene {given.id}: blocks rest on one another in a circle"
-        raise DataError(Problem(where, message, "blocks", cycle)) from None
+    graph = scene_of(given.id, levels, blocks).graph
     placed: list[int] = []
     while ready := graph.ready(sum(1 << vertex for vertex in placed)):
         placed.append(ready[0])
@@ -109,10 +102,9 @@ def derived(given: GivenScene, where: str) -> Scene:
 
 
 def read_given(file: Path) -> list[tuple[GivenScene, str]]:
-    """Return the scenes of a YAML or JSON file by id, with their places in it.
+    """Return the scenes of a YAML or JSON file by id, with their places in it. Raises InputError.
 
-    It holds a scene, a list, or a mapping with `scenes`. A scene without an `id` is named after the
-    file, in a list with its number. Raises InputError.
+    It holds a scene, a list, or a mapping with `scenes`; one without `id` is named after the file.
     """
     source = read_yaml(file, may_hold_keys=True)
     data: Any = source.data

@@ -13,8 +13,6 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence, Set
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import partial
-from itertools import islice
 from pathlib import Path
 from typing import Literal, NamedTuple
 
@@ -201,9 +199,8 @@ class Production:
         self._named: Counter[int] = Counter()
 
     def tasks(self, wanted: Sequence[Share]) -> Iterator[AssemblyTask]:
-        """Yield base scenes by group, then variations, with more base scenes for missing ones.
-
-        Raises DataError if the rules give no more different scenes.
+        """Yield base scenes by group, then variations, or more base scenes for missing ones. Raises
+        DataError if the rules give no more different scenes.
         """
         width = max(3, len(str(sum(share.base + share.varied for share in wanted))))
 
@@ -215,7 +212,7 @@ class Production:
             return AssemblyTask(scene, make_candidates(scene, palette=self._palette))
 
         def bases(group: str, count: int) -> Iterator[AssemblyTask]:
-            taken, request = 0, partial(Request, self._seed, self._palette, group)
+            taken, request = 0, functools.partial(Request, self._seed, self._palette, group)
             for made, scene in self._accepted(count, request, self._next[group]):
                 taken, self._next[group], task = taken + 1, made.number + 1, named(scene)
                 self._bases[made] = task.key
@@ -270,7 +267,7 @@ class Production:
                     fresh.append(one)
             sound = self._workers.map(is_acceptable, [one.scene for one in fresh])
             kept = (one for one, is_kept in zip(fresh, sound, strict=True) if is_kept)
-            for one in islice(kept, wanted - taken):
+            for one in itertools.islice(kept, wanted - taken):
                 taken, last = taken + 1, one.request.number
                 yield one.request, one.scene
 
@@ -285,17 +282,15 @@ NEEDED: dict[BlockType, dict[str, float]] = read_own_yaml(Path(__file__).with_na
 counted in 1,200 goals. Poses that no goal needs would give themselves away and are not offered."""
 _EVEN_SHARE = 0.36
 """Share of the sets that offer a look in which it is needed: 5.76 of 16 on average."""
-_RISING: tuple[tuple[BlockType, ...], ...] = (
-    *(("arch",), ("cylinder",), ("cuboid2",), ("cuboid3",), ("cube",), ("cuboid1",)),
-    ("triangle", "semi_cylinder"),
-)
+_TIERS: dict[BlockType, int] = {
+    **{"arch": 0, "cylinder": 1, "cuboid2": 2, "cuboid3": 3, "cube": 4, "cuboid1": 5},
+    **{"triangle": 6, "semi_cylinder": 6},
+}
 """Types from those low in goals to those high in them. So naming all candidates as listed is
 already a good building order, and a reader gains nothing by finding a better one."""
-_TIERS = {block_type: tier for tier, types in enumerate(_RISING) for block_type in types}
 _RARER: dict[BlockType, float] = {"triangle": 0.7}
 """Factors on how often a type is drawn as a distractor. Triangles have one color and six poses: in
-setting B, where poses do not count, all of them are the same block offered repeatedly, and leaving
-some out would pay."""
+setting B, where poses do not count, they are one block offered often, and omitting some pays."""
 _MOST_DRAWN = 0.98
 """Upper limit: looks that more than `_EVEN_SHARE` of all goals need are nearly always offered."""
 
@@ -336,7 +331,7 @@ def make_candidates(scene: Scene, seed: int = 0, *, palette: Palette = "kit") ->
         return -math.log(number(one, "drawn")) / others[one]
 
     def place(one: Candidate) -> tuple[int, float]:
-        return _TIERS.get(one.type, len(_RISING)), number(one, "place")
+        return _TIERS.get(one.type, len(_TIERS)), number(one, "place")
 
     distractors = sorted(others, key=waiting)[: scenes.MAX_CANDIDATES - len(needed)]
     return CandidateSet(tuple(sorted([*needed.values(), *distractors], key=place)))

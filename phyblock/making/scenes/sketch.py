@@ -1,8 +1,7 @@
 """A sketch pad for structures: put blocks down one after another, as a person builds.
 
-A block is lowered from above at a place on the grid, in a named pose, and its height follows from
-what it lands on; so designs give no heights, and have no overlaps and no gaps. Rules that draw
-whole structures are in `rules.yaml`.
+A block is lowered at a place on the grid, in a named pose, and its height follows from what it
+lands on; so designs have no heights, overlaps or gaps. `rules.yaml` draws whole structures.
 """
 
 from __future__ import annotations
@@ -152,9 +151,8 @@ class Draft:
         pose: str = "",
         color: Color | None = None,
     ) -> None:
-        """Lower a block with the center of its outline at (x, y) [grid units].
-
-        `pose` is a name from `POSES`, by default the first; `color` is by default the kit's.
+        """Lower a block, the center of its outline at (x, y) [grid units], by default in the first
+        of its `POSES` and in the kit's color.
         """
         poses = POSES[block_type]
         euler = poses[pose] if pose else next(iter(poses.values()))
@@ -220,9 +218,8 @@ _ACROSS = Symmetry(2, mirrored=True)
 
 
 def beside(parts: Sequence[Sequence[Block]], gap_units: float, axis: int = 1) -> list[Block]:
-    """Return the parts in a row with gaps between their outlines [grid units], numbered from 1.
-
-    They stand side by side along x, the depth (`axis` 0), or y, the front (1).
+    """Return the parts side by side along x, the depth (`axis` 0), or y, the front (1), with gaps
+    between their outlines [grid units], numbered from 1.
     """
     row: list[Block] = []
     edge_m = 0.0
