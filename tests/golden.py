@@ -37,25 +37,22 @@ RUNS: dict[str, tuple[str, ...]] = {
     "paper-table1": ("paper-table1", "--set", "dataset.path={official}"),
 }
 
+_JSON = {"answer_format": "json_schema"}
 _SHOWN: dict[str, Any] = {"source": "render", "size_px": 128}
 SUITES: dict[str, dict[str, Any]] = {
     "plans": {},
     "plans-separate": {"images": {**_SHOWN, "layout": "separate", "order": ["candidates", "goal"]}},
-    "plans-json": {"answer_format": "json_schema"},
+    "plans-json": _JSON,
     "plans-blind": {"full_planning": {"blind": True}},
     "plans-shuffled": {"candidates": {"order": "shuffled"}, "seeds": [0, 1]},
     "plans-varied": {
         "vary": {"view": ["oblique", "front"], "layout": ["composite", "separate"], "repeats": 2}
     },
     "steps": {"tracks": ["step_planning"]},
-    "steps-json": {"tracks": ["step_planning"], "answer_format": "json_schema"},
+    "steps-json": {"tracks": ["step_planning"], **_JSON},
     "poses": {"tracks": ["pose_planning"]},
     "questions": {"tracks": ["vqa"]},
-    "questions-json": {
-        "tracks": ["vqa"],
-        "answer_format": "json_schema",
-        "vqa": {"circular": True},
-    },
+    "questions-json": {"tracks": ["vqa"], **_JSON, "vqa": {"circular": True}},
 }
 _LIMITS = {"questions": 16, "questions-json": 16}
 

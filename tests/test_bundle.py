@@ -107,7 +107,6 @@ def test_a_run_without_its_data_is_bundled_to_the_same_bytes(made, tmp_path):
 
 
 def test_samples_that_were_left_out_are_counted(made, tmp_path):
-    """Anyone may leave out what went wrong and bundle the rest: then it is said."""
     shutil.copytree(made.out, tmp_path / "run")
     lines = (tmp_path / "run" / RECORDS).read_text(encoding="utf-8").splitlines(keepends=True)
     (tmp_path / "run" / RECORDS).write_text("".join(lines[1:]), encoding="utf-8")

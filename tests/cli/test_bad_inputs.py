@@ -61,12 +61,10 @@ file_in_the_way = partial(file, "taken", "mine")
 
 
 def models_text(text, *args):
-    """`models.yaml` is this text."""
     return file("models.yaml", text, *FRESH, *args)
 
 
 def prompt(text):
-    """The prompt is a template with this text."""
     return file("mine.j2", text, *FRESH, "--models", "alpha", "--set", "prompt=mine.j2")
 
 
@@ -131,7 +129,7 @@ class Bad(NamedTuple):
     bytes_left: int | None = None
 
 
-INPUTS = (
+BAD = (
     Bad("key", suite_line("sede: [1]"), ("suite.yaml:4:1: sede", "did you mean seeds?", "allowed")),
     Bad("model", suite_line("models: [alpah]"), ("suite.yaml:3:10: models[0]", "mean alpha?")),
     Bad("no-samples", suite_line("dataset: {path: ./low}\nlevels: [4]"), ("no samples", "1, 2")),
@@ -191,8 +189,6 @@ INPUTS = (
         ("model alpha: price", "max_cost_usd", "models.yaml"), writes=("fresh",)),
     Bad("no-recording", models_text("old: {replay: replies}\n", "--models", "old"),
         ("models.yaml:1:15: old.replay: recordings not found", "replies"), writes=("fresh",)),
-)  # fmt: skip
-FOLDERS = (
     Bad("below-file", file_in_the_way("run", "suite.yaml", "--out", "taken/x"),
         ("taken/x", "cannot be written: Not a directory", "--out")),
     Bad("long-name", command("run", "suite.yaml", "--out", "x" * 300),
@@ -238,14 +234,10 @@ FOLDERS = (
         bytes_left=100),
     Bad("full-init", command("init", "new"), ("new", "cannot be written"),
         writes=("new",), bytes_left=100),
-)  # fmt: skip
-CACHES = (
     Bad("broken-cache", file("cache/replies.sqlite", b"not a database" * 40, *CACHED),
-        ("replies.sqlite", "hint: "),
-        writes=("fresh",)),
+        ("replies.sqlite", "hint: "), writes=("fresh",)),
     Bad("foreign-cache", after(foreign_cache, "cache"),
-        ("replies.sqlite", "another version", "hint: "),
-        writes=("fresh",)),
+        ("replies.sqlite", "another version", "hint: "), writes=("fresh",)),
     Bad("full-cache", command(*FRESH, "--models", "alpha", "--set", "seeds=[1]"),
         ("replies.sqlite", "cannot be used: disk I/O error", "free some space"),
         writes=("fresh", "cache/replies.sqlite-"), bytes_left=6000),
@@ -255,7 +247,6 @@ CACHES = (
     Bad("cache-below", file_in_the_way("run", "suite.yaml", "--out", "fresh", "--models", "alpha"),
         ("taken/x", "PHYBLOCK_CACHE"), env={"PHYBLOCK_CACHE": "taken/x"}, writes=("fresh",)),
 )  # fmt: skip
-BAD = INPUTS + FOLDERS + CACHES
 
 
 @pytest.fixture(scope="module")

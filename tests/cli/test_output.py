@@ -21,9 +21,7 @@ from tests.workspace import COMMAND, files_below, invoked
 
 
 def in_terminal(workspace, answer):
-    """Run with a terminal of 120 columns, and type `answer` first; exit code and screen. No page,
-    which takes seconds.
-    """
+    """Run with a terminal of 120 columns, and type `answer` first; exit code and screen."""
     master, slave = pty.openpty()
     words = [*COMMAND, "run", "suite.yaml", "--out", str(workspace.out), "--no-report"]
     env = workspace.env | {"TERM": "xterm-256color", "COLUMNS": "120", "LINES": "40"}

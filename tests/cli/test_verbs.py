@@ -78,16 +78,13 @@ def test_every_option_that_messages_and_docs_name_is_there():
             words = before.split()
             named |= {(*words[:2], re.split(r"[^a-z0-9-]", option)[0]) for option in options}
     assert {verb for verb, *_ in named} >= {"run", "scenes", "compare"}
-    assert [each for each in sorted(named) if not is_option(*each)] == []
-
-
-def is_option(verb, *words):
-    """True if a verb, or its own verb that the next word names, has the option that ends it."""
     context = click.Context(phyblock)
-    command = phyblock.get_command(context, verb)
-    inner = command.get_command(context, words[0]) if isinstance(command, click.Group) else None
-    known = {name for one in (command, inner) if one for param in one.params for name in param.opts}
-    return words[-1] in known | {"--help"}
+    for verb, *words in sorted(named):
+        # Of a verb, or of its own verb that the next word names.
+        command = phyblock.get_command(context, verb)
+        inner = command.get_command(context, words[0]) if isinstance(command, click.Group) else None
+        params = [param for one in (command, inner) if one for param in one.params]
+        assert words[-1] in {"--help"}.union(*(param.opts for param in params)), (verb, *words)
 
 
 @pytest.mark.parametrize(

@@ -12,22 +12,14 @@ from phyblock.config.models import host_of, is_address, load_models
 from phyblock.errors import SpecError
 from phyblock.models.client import server_address
 from phyblock.registry import baseline_names
-from tests.config.tables import table, told
+from tests.config.tables import told
 from tests.fuzz.strategies import MODELS_FILES
-
-BAD = table("bad_models.yaml")
 
 
 def load(folder, text):
     path = folder / "m.yaml"
     path.write_text(text, encoding="utf-8")
     return load_models(path)
-
-
-@pytest.mark.parametrize("entry", BAD, ids=range(len(BAD)))
-def test_all_that_is_wrong_is_told_in_the_order_of_the_file(tmp_path, entry):
-    says = told(tmp_path, "models", entry["models"])
-    assert says == entry["says"], "if this is meant: python -m tests.config.tables"
 
 
 def test_one_line_is_enough_and_a_mapping_says_more(tmp_path):

@@ -20,13 +20,14 @@ from tests.fuzz.strategies import FIELDS, OVERRIDES, REQUIRED, SECTIONS, SOUND_S
 
 SUITE_MODEL = suite_model()
 HEAD = "name: s\nmodels: [oracle]\n"
-BAD = table("bad_suites.yaml")
+BAD = [("suite", one) for one in table("bad_suites.yaml")]
+BAD += [("models", one) for one in table("bad_models.yaml")]
 JARGON = r"pydantic|Input should|valid (dictionary|tuple|string)|_type\b|extra_forbidden|Spec\b"
 
 
-@pytest.mark.parametrize("entry", BAD, ids=range(len(BAD)))
-def test_all_that_is_wrong_is_told_in_the_order_of_the_file(tmp_path, entry):
-    says = told(tmp_path, "suite", entry["suite"], entry.get("set", ()))
+@pytest.mark.parametrize(("kind", "entry"), BAD, ids=range(len(BAD)))
+def test_all_that_is_wrong_is_told_in_the_order_of_the_file(tmp_path, kind, entry):
+    says = told(tmp_path, kind, entry[kind], entry.get("set", ()))
     assert says == entry["says"], "if this is meant: python -m tests.config.tables"
     assert not re.search(JARGON, says)
 

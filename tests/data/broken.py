@@ -1,6 +1,4 @@
-"""A sound scene in the project's own format, and ways to write it down and break it; a sound record
-line, and ways in which a hand or a disk damages it.
-"""
+"""A sound scene and a sound record, and ways to write them down and to break them."""
 
 import copy
 import json
@@ -90,7 +88,6 @@ def lines_before() -> list[bytes]:
 
 
 def plan_record() -> Raw:
-    """The record of a plan."""
     return json.loads(lines_before()[0])
 
 

@@ -12,7 +12,7 @@ from phyblock.errors import DataError
 from tests.data.broken import sound_scene, with_value, without, write_scenes
 from tests.fuzz.strategies import QUESTIONS, sound_question
 from tests.sim.structures import block
-from tests.workspace import problem_of, tower, write_lines
+from tests.workspace import problem_of, tower, write_questions
 
 QUESTION = sound_question("s1") | {"id": "co-001"}
 
@@ -20,11 +20,6 @@ QUESTION = sound_question("s1") | {"id": "co-001"}
 @pytest.fixture
 def scenes(tmp_path):
     return read_builtin(write_scenes(tmp_path, sound_scene()))
-
-
-def write(folder, *questions):
-    folder.mkdir(exist_ok=True)
-    return write_lines(folder / "questions.jsonl", questions).parent
 
 
 def test_a_picture_is_the_scene_but_for_what_its_recipe_says(tmp_path, scenes):
@@ -42,7 +37,7 @@ def test_a_picture_is_the_scene_but_for_what_its_recipe_says(tmp_path, scenes):
     asked = QUESTION | {"pictures": [recipe], "background": "lawn"}
     # A whole character in two escapes is fine.
     asked["question"] = "How many \U0001f9f1?"
-    (task,) = read_questions(write(tmp_path / "q", asked), scenes).tasks
+    (task,) = read_questions(write_questions(tmp_path / "q", [asked]), scenes).tasks
     assert task.question.text == asked["question"]
     blocks = (
         block(2, "cuboid2", (0, 0, 0.1), (0, 0, 45), "green", (1,)),
@@ -91,7 +86,7 @@ BROKEN = [
 @pytest.mark.parametrize(("at", "value", "field", "found"), BROKEN)
 def test_what_is_wrong_is_named_with_its_line(tmp_path, scenes, at, value, field, found):
     broken = with_value(QUESTION | {"id": "co-002"}, at, value)
-    folder = write(tmp_path / "q", QUESTION, broken)
+    folder = write_questions(tmp_path / "q", [QUESTION, broken])
     problem = problem_of(DataError, read_questions, folder, scenes)
     assert problem.where == f"{folder / 'questions.jsonl'}:2"
     assert (problem.field, problem.found) == (field, found)
@@ -108,7 +103,7 @@ def test_what_is_missing_or_there_twice_is_told(tmp_path, scenes):
         *(([without(QUESTION, one)], rf"questions.jsonl:1: {one}: is missing") for one in fields),
     ):
         with pytest.raises(DataError, match=said):
-            read_questions(write(tmp_path / "q", *lines), scenes)
+            read_questions(write_questions(tmp_path / "q", lines), scenes)
 
 
 OTHERS = {
@@ -124,7 +119,8 @@ OTHERS = {
 
 def test_the_digest_of_a_set_follows_every_field(tmp_path, scenes):
     changed = [QUESTION, QUESTION, *({**QUESTION, name: OTHERS[name]} for name in OTHERS)]
-    digests = [read_questions(write(tmp_path / "q", one), scenes).sha256 for one in changed]
+    folders = (write_questions(tmp_path / "q", [one]) for one in changed)
+    digests = [read_questions(folder, scenes).sha256 for folder in folders]
     assert digests[0] == digests[1]
     assert len(set(digests)) == 1 + len(OTHERS)
 
@@ -132,7 +128,7 @@ def test_the_digest_of_a_set_follows_every_field(tmp_path, scenes):
 def test_complaints_of_one_line_are_bounded(tmp_path, scenes):
     question = QUESTION | {f"field{i}": [0] * 20 for i in range(5_000)}
     with pytest.raises(DataError) as caught:
-        read_questions(write(tmp_path / "q", question), scenes)
+        read_questions(write_questions(tmp_path / "q", [question]), scenes)
     assert len(caught.value.problems) == 100
 
 

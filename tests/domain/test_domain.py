@@ -1,6 +1,4 @@
-"""Blocks: the Euler convention, orientation classes against geometry, sizes and masses; laws of the
-AOV graph.
-"""
+"""Blocks: Euler angles, orientation classes, sizes and masses by geometry; laws of AOV graphs."""
 
 import itertools
 import math

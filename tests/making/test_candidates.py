@@ -76,9 +76,7 @@ def test_no_place_tells_what_is_needed():
 
 
 def gain(tasks, setting, repeats):
-    """F1 of what is learned over that of naming every candidate once; where candidates may be
-    named again, over that of naming all of them equally often.
-    """
+    """F1 of what is learned over that of naming all candidates once, or all equally often."""
     goals, sets = [scene for scene, _ in tasks], {scene.id: offered for scene, offered in tasks}
     learned = goal_blind_plans(goals, sets, setting, repeats=repeats)
     every = {name: Plan(tuple(range(1, len(one) + 1))) for name, one in sets.items()}

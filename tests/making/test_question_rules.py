@@ -132,9 +132,7 @@ def benches(rng, has_pillar):
 
 @pytest.mark.parametrize("has_pillar", [False, True])
 def test_a_bench_leaves_the_scene_as_it_is_and_its_lever_says_what_stays(has_pillar):
-    """Nothing overlaps or floats; statics mostly say what a lever does, but for other tops. What
-    rests on a block that goes is not always what falls.
-    """
+    """Mostly, but for other tops; what rests on a block that goes is not always what falls."""
     rng = np.random.default_rng(3)
     said, broken = Counter(), 0
     for on in itertools.islice(benches(rng, has_pillar), 12):
@@ -217,9 +215,7 @@ def test_of_four_next_steps_one_stays_however_far_its_plank_hangs_over(rank):
     ("y_m", "stays"), [(0, True), (-0.068, False), (0.05, False), (-0.053, None)]
 )
 def test_a_block_stays_where_the_plank_does_not_tip(y_m, stays):
-    """A plank lies along y, balanced on a cube in its middle, beside whose one end a wall is in the
-    way; unsure is where the weights are nearly over the edge.
-    """
+    """A wall is in the way of one end; unsure is where the weights are nearly over the edge."""
     plank = block(2, "cuboid3", (0, 0, 0.0625), (0, 0, 90))
     wall = block(3, "cuboid3", (0.055, 0.05, 0.075), (0, 90, 0))
     put, place_m = block(4, "cuboid3", (0, 0, 0), (90, 0, 0)), (0, y_m, 0.075)

@@ -69,7 +69,6 @@ def test_every_answer_is_derived_again_and_every_other_is_found_out(static, pict
 
 
 def test_what_was_changed_is_found(static):
-    """A text, a scene that is counted over, and options without the right one."""
     for question in static:
         options = list(question.options)
         options[question.answer[0]] = "the purple ball"
@@ -108,7 +107,6 @@ def test_pictures_of_options_are_whole_and_told_apart(pictured):
 
 
 def test_pictures_that_were_changed_are_found_out(pictured):
-    """A color that no text names; the right picture in the place of every wrong one."""
     colored = next(q for q in pictured if q.wording == "cf-color")
     gray = {tuple(replace(b, color="red") for b in one.blocks) for one in colored.pictures}
     assert (len(gray), len({one.blocks for one in colored.pictures})) == (1, 5)
@@ -245,7 +243,6 @@ def test_a_repeat_is_found_in_any_order_of_its_options_and_blocks(asked):
 
 
 def test_a_text_or_a_picture_that_gives_the_answer_away_is_a_finding(asked):
-    """The cube is always right; the right one of four equal pictures lacks a block."""
     cubes = [
         replace(q, id=f"sh-{n}", answer=(q.options.index("cube"),))
         for n, q in enumerate(5 * asked["SH"])

@@ -67,7 +67,6 @@ def runs(new_workspace):
 
 
 def goes_on(folder):
-    """Go on with the run of a workspace."""
     return call("run", folder.parent / "suite.yaml", "--out", folder, "--no-report")
 
 

@@ -1,6 +1,4 @@
-"""Plans: matchers, Level-1 criteria, ratios, one type for each wrong step and one outcome for each
-goal block, against plain re-implementations.
-"""
+"""Plans against plain rules: matchers, criteria, ratios, types of wrong steps, ends of blocks."""
 
 from collections import Counter
 from fractions import Fraction
@@ -33,9 +31,7 @@ def matched(case, setting, matcher="optimal"):
 @each_setting
 @given(case=cases(max_blocks=8, max_steps=12) | carriers())
 def test_optimal_is_the_best_of_all_sequences_of_choices_and_paper_is_algorithm_1(setting, case):
-    """The counts follow: B is never below A, nor optimal below paper, whatever the file order. Of
-    choices as good as each other, the one with the lightest errors is taken.
-    """
+    """Of choices as good as each other, the one with the lightest errors is taken."""
     steps, blocks = len(case.plan), len(case.scene)
     greatest, *lightest = made.best_of_all(case, setting)
     for matcher, tp in (("optimal", greatest), ("paper", made.greedy_tp(case, setting))):
@@ -89,13 +85,10 @@ def test_selection_matches_one_to_one_without_order_and_membership_counts_what_o
         assert level1(case, setting, criterion) == Counts(tp, steps - tp, n - tp)
 
 
-@given(counts=st.lists(COUNTS, max_size=8), data=st.data())
-def test_micro_averages_sum_first_whatever_the_order(counts, data):
-    total = sum(counts, Counts())
+@given(counts=st.lists(COUNTS, max_size=8), half=st.integers(0, 8))
+def test_micro_averages_sum_first_whatever_the_parts(counts, half):
+    total = sum(counts[:half], Counts()) + sum(counts[half:], Counts())
     assert total == Counts(*(sum(getattr(c, name) for c in counts) for name in ("tp", "fp", "fn")))
-    assert sum(data.draw(st.permutations(counts)), Counts()) == total
-    half = data.draw(st.integers(0, len(counts)))
-    assert sum(counts[:half], Counts()) + sum(counts[half:], Counts()) == total
 
 
 @given(counts=COUNTS)

@@ -121,7 +121,6 @@ def test_aligned_does_not_change_when_the_whole_plan_is_shifted_and_turned(
 @settings(max_examples=40)
 @given(scenes(), st.randoms(use_true_random=False), st.sampled_from([0.005, 0.015, 0.03]))
 def test_the_best_motion_of_a_plan_is_no_worse_than_none(drawn, random, sigma_m):
-    """Also where steps come in an order that is not valid, or some are anywhere."""
     scene, candidates = drawn
     order = random.choices(range(len(scene)), k=random.randint(1, len(scene)))
     steps = noisy(laid(scene, order), np.random.default_rng(random.getrandbits(32)), sigma_m)

@@ -34,10 +34,7 @@ def test_a_valid_order_never_fails_whatever_looks_alike(case, setting, gating, s
 
 @given(cases(max_steps=14) | carriers(), any_setting, any_gating)
 def test_the_world_is_always_one_that_can_be_built(case, setting, gating):
-    """Whatever is placed has all that it depends on, under the setting that let it; the right moves
-    are those that work; no more is placed than the optimal matcher allows. Equal blocks change
-    places only where none is ready.
-    """
+    """And holds no more than the optimal matcher allows; blocks swap only where none is ready."""
     assembly = Assembly(case.scene, case.candidates, setting, gating)
     world = replace(case, scene=gated(case.scene, gating))
     graph, blocks = world.scene.graph, world.scene.blocks

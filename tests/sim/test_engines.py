@@ -30,7 +30,6 @@ def chosen(word):
 
 @pytest.fixture(params=engines.installed_engines(), scope="module")
 def engine(request):
-    """Any engine."""
     return chosen(request.param)
 
 

@@ -27,9 +27,7 @@ def track_of(
     limit: int | None = None,
     **fields: Any,
 ) -> Any:
-    """A track about these scenes, in a suite of these fields; with prompts and small pictures where
-    there is a shop to draw them.
-    """
+    """A track about these scenes, in a suite of these fields; a shop draws its small pictures."""
     images = {"size_px": 128, **fields.pop("images", {})}
     whole = {"name": "s", "tracks": [name], "models": ["oracle"], "images": images, **fields}
     with tempfile.NamedTemporaryFile("w", suffix=".yaml") as file:

@@ -75,7 +75,6 @@ def run(inside):
 
 
 def test_the_leading_measure_leads_everywhere(run, monkeypatch):
-    """The first one, or that of the main column of the headline."""
     columns = tuple(LayoutColumn({m.name: m.heading}, main=m is EXACT) for m in (ERROR, EXACT))
     report = replace(Counting.report(), headline=columns)
     for leading in (ERROR, EXACT):

@@ -148,7 +148,6 @@ def fit(position_cm, up_cm, turn_deg=0.0):
     ],
 )
 def test_a_step_has_one_error_the_first_in_time(task, one, error, end):
-    """Errors of a reply come before those of its execution."""
     goal = Goal(task.scene, task.candidates, "A")
     physical = {"stands": None, "falls": "floating", "knocks_over": "toppling"}
     physical |= {"overlaps": "interpenetrating", "under_floor": "interpenetrating"}

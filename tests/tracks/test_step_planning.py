@@ -138,7 +138,6 @@ def test_limits_end_an_episode(limits, agent, ending, steps):
 
 
 def test_no_hostile_reply_stops_an_episode():
-    """Each of them has its named outcome, and what follows is played as if it had not been."""
     for _, _, text in ROWS:
         fields, _ = play(tower("red", "blue"), scripted(text, "Move(1)", "Move(3)"))
         assert set(fields["outcomes"]) <= {*MOVE_OUTCOMES, *MOVE_PROBLEMS, "done"}, text
@@ -175,7 +174,6 @@ def test_the_oracle_completes_every_scene(of, accepts, request):
 
 
 def test_a_turned_block_is_placed_in_b_and_wrong_in_a():
-    """The oracle without orientation: what setting B lets pass is counted in setting A."""
     blocks = (block(1, "arch", (0, 0, 0.025)), block(2, "cube", (0, 0, 0.075), depend=(1,)))
     looks = [("arch", 0), ("arch", 90), ("cube", 0)]
     numbered = tuple(Candidate(t, "red", (0, 0, turn)) for t, turn in looks)
@@ -209,7 +207,6 @@ def test_a_collapse_ends_an_episode_under_strict_physics_alone(physics, ending, 
     st.integers(1, 4),
 )
 def test_runs_of_failures_end_an_episode(moves, most_failures, most_repeats):
-    """A move is named over and over until one of both limits is reached, as counted by hand."""
     track = made(max_failures=most_failures, max_repeats=most_repeats, max_steps=99)
     named = [*moves, *[6] * 4]
     said = scripted(*("?" if move is None else f"Move({move})" for move in named))
@@ -235,7 +232,6 @@ def test_feedback_tells_no_more_than_it_may(feedback):
 
 
 def test_pictures_of_states_are_drawn_and_kept(tmp_path):
-    """An episode sees one picture a state; a second episode finds them all."""
 
     def right_move(request):
         return f"Move({request.subject.valid[0]})"

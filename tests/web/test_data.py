@@ -269,9 +269,9 @@ def test_runs_of_different_limits_are_told_so():
 
 
 def test_a_recording_and_a_larger_picture_stand_beside_any_other():
-    first, larger = site_run("one"), site_run("two", **shown({"size_px": 512}, "b"))
-    check_runs([site_run("one", **shown({}, "a")), larger])
-    check_runs([first, site_run("two", **of_track(prompt=None, pictures=None))])
+    larger, recorded = shown({"size_px": 512}, "b"), of_track(prompt=None, pictures=None)
+    for one, other in ((shown({}, "a"), larger), ({}, recorded)):
+        check_runs([site_run("one", **one), site_run("two", **other)])
 
 
 def test_a_build_that_was_stopped_never_looks_whole_and_what_is_not_ours_stays(

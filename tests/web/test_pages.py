@@ -19,7 +19,6 @@ def painted(page, selector):
 
 
 def pictures(page, *selectors):
-    """Return what canvases show now."""
     return [page.eval_on_selector(one, "canvas => canvas.toDataURL()") for one in selectors]
 
 

@@ -20,9 +20,7 @@ HOSTILE = "<img src=x onerror=alert(1)></script><script>alert(2)</script>"
 
 @pytest.fixture(scope="module")
 def workspace(new_workspace):
-    """Three scenes and four questions, hostile texts in these; scenes are asked about without poses
-    and with. A run of two baselines.
-    """
+    """Three scenes, with poses and without, four hostile questions, and a run of two baselines."""
     made = new_workspace(*SCENES[:3])
     asked = questions(SCENES[:2], 1, SUBTASKS)
     for one in asked:
