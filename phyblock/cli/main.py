@@ -16,37 +16,35 @@ from phyblock.registry import PLUGINS
 from phyblock.text import counted, did_you_mean, plain_lines
 from phyblock.types import QUOTE_HINT
 
-_CLI, _MAKING, _MORE = "phyblock.cli", "phyblock.making.cli", "phyblock.integrations"
 _SECTIONS = {
     "Run": {
-        "init": (f"{_CLI}.setup:init", "Create a folder: a suite, models.yaml, prompts."),
-        "validate": (f"{_CLI}.setup:validate", "Check suites, models files and data sets."),
-        "models": (f"{_CLI}.setup:models", "List models with prices and keys."),
-        "cache": (f"{_CLI}.setup:cache", "List replies kept for other runs, or delete some."),
-        "run": (f"{_CLI}.run:run", "Run a suite, or continue where it stopped."),
-        "play": (f"{_CLI}.run:play", "Answer a suite yourself, in a browser."),
-        "score": (f"{_CLI}.run:score", "Score stored replies again; calls no model."),
+        "init": ("cli.setup", "Create a folder: a suite, models.yaml, prompts."),
+        "validate": ("cli.setup", "Check suites, models files and data sets."),
+        "models": ("cli.setup", "List models with prices and keys."),
+        "cache": ("cli.setup", "List replies kept for other runs, or delete some."),
+        "run": ("cli.run", "Run a suite, or continue where it stopped."),
+        "play": ("cli.run", "Answer a suite yourself, in a browser."),
+        "score": ("cli.run", "Score stored replies again; calls no model."),
     },
     "Look": {
-        "report": (f"{_CLI}.results:report", "Rebuild tables and page, or print the tables."),
-        "show": (f"{_CLI}.results:show", "Show a sample: prompt, reply, verdict of each step."),
-        "compare": (f"{_CLI}.results:compare", "Compare models on the same samples."),
-        "figures": (f"{_CLI}.results:figures", "Draw figures for a paper, as PDF and SVG."),
+        "report": ("cli.results", "Rebuild tables and page, or print the tables."),
+        "show": ("cli.results", "Show a sample: prompt, reply, verdict of each step."),
+        "compare": ("cli.results", "Compare models on the same samples."),
+        "figures": ("cli.results", "Draw figures for a paper, as PDF and SVG."),
     },
     "Share": {
-        "export": (f"{_MORE}.cli:export", "Write a run, scenes or questions for other tools."),
-        "bundle": (f"{_CLI}.results:bundle", "Write a run as one file that others can verify."),
-        "verify": (f"{_CLI}.results:verify", "Score a bundle again and compare."),
-        "site": (f"{_CLI}.results:site", "Make a leaderboard of runs and bundles."),
+        "export": ("integrations.cli", "Write a run, scenes or questions for other tools."),
+        "bundle": ("cli.results", "Write a run as one file that others can verify."),
+        "verify": ("cli.results", "Score a bundle again and compare."),
+        "site": ("cli.results", "Make a leaderboard of runs and bundles."),
     },
     "Data": {
-        "scenes": (f"{_MAKING}:scenes", "Make, check, show and draw scenes."),
-        "questions": (f"{_MAKING}:questions", "Make, check and show questions."),
+        "scenes": ("making.cli", "Make, check, show and draw scenes."),
+        "questions": ("making.cli", "Make, check and show questions."),
     },
 }
-"""Commands by the heading in the help: the place of each (`module:name`), and its help text."""
+"""Commands by the heading in the help: each with its module in phyblock and its help text."""
 _VERBS = {name: verb for verbs in _SECTIONS.values() for name, verb in verbs.items()}
-_ENTRY_POINTS = "phyblock.plugins"
 
 
 def _load_plugins(_: click.Context, __: click.Parameter, modules: tuple[str, ...]) -> None:
@@ -54,7 +52,7 @@ def _load_plugins(_: click.Context, __: click.Parameter, modules: tuple[str, ...
 
     Raises SpecError naming the line in which one fails.
     """
-    entries = entry_points(group=_ENTRY_POINTS)
+    entries = entry_points(group="phyblock.plugins")
     named = {entry.value.partition(":")[0]: f"plugin {entry.name}" for entry in entries}
     if modules and os.getcwd() not in sys.path:
         sys.path.insert(0, os.getcwd())
@@ -80,8 +78,8 @@ class _Verbs(click.Group):
         if cmd_name not in _VERBS:
             hint = did_you_mean(cmd_name, _VERBS) or f"Commands: {', '.join(_VERBS)}"
             raise click.UsageError(f"No such command {cmd_name!r}. {hint.capitalize()}", ctx)
-        module, _, name = _VERBS[cmd_name][0].partition(":")
-        command: click.Command = getattr(importlib.import_module(module), name)
+        module = importlib.import_module(f"phyblock.{_VERBS[cmd_name][0]}")
+        command: click.Command = getattr(module, cmd_name)
         return command
 
     def format_commands(self, _: click.Context, formatter: click.HelpFormatter) -> None:

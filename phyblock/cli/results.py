@@ -171,9 +171,7 @@ def _print_prompt(console: Console, run: Path, record: Record) -> None:
 @ui.models_option("Only these models; of two runs, A of the first.")
 @click.option("--track", metavar="NAME", default="", show_default="the first in both")
 @click.option("--measure", metavar="NAME", default="", show_default="the headline measure")
-@click.option(
-    "--out", type=ui.UserPath(), metavar="DIR", help="Folder for CSV, Markdown and LaTeX."
-)
+@click.option("--out", type=ui.UserPath(), metavar="DIR", help="Folder for CSV, Markdown, LaTeX.")
 def compare(
     run: Path, other: Path | None, models: Sequence[str], track: str, measure: str, out: Path | None
 ) -> None:
@@ -230,9 +228,7 @@ def figures(
 
 @click.command()
 @ui.run_argument
-@click.option(
-    "--out", type=ui.UserPath(), metavar="FILE", help="The file. [default: RUN/bundle.zip]"
-)
+@click.option("--out", type=ui.UserPath(), metavar="FILE", help="[default: RUN/bundle.zip]")
 def bundle(run: Path, out: Path | None) -> None:
     """Write the folder RUN as one file: manifest, records, digests.
 
