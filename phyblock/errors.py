@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 _LONGEST_PART = 2000  # Characters that are shown of each part of a problem.
 
@@ -96,8 +96,11 @@ class ModelError(PhyblockError):
 
     `status` is the HTTP status, if the server answered; `sent` the progress of the call, which
     decides about retries and cost; `retry_after_s` what the server asks for; `billed_usd` what a
-    run's cost limit counts for all attempts [US dollars], None without a limit.
+    run's cost limit counts for all attempts [US dollars], None without a limit. `kind` is its name
+    in records.
     """
+
+    kind: ClassVar[str] = "unavailable"
 
     def __init__(
         self,
@@ -118,13 +121,19 @@ class ModelError(PhyblockError):
 class RetryableError(ModelError):
     """The call may succeed when sent again: 429, 5xx, connection, timeout, malformed body."""
 
+    kind = "retryable"
+
 
 class SampleError(ModelError):
     """This request can never succeed (400); other requests to the model may."""
 
+    kind = "sample"
+
 
 class RefusedError(SampleError):
     """The provider's content policy refused this request."""
+
+    kind = "refused"
 
 
 class UnavailableError(ModelError):

@@ -35,7 +35,7 @@ from phyblock.results.text import NO_VALUE, REPORT_FILE, TABLES, Column, TextTab
 from phyblock.run import plan as plans
 from phyblock.run.manifest import code_versions
 from phyblock.run.plan import Estimate, RunPlan
-from phyblock.run.runner import RunEvent, RunResult, RunStarted, SampleDone, Session, completed
+from phyblock.run.runner import RunEvent, RunResult, RunStarted, Session, completed
 from phyblock.run.store import Summary, held_run
 from phyblock.scoring.plan import Counts
 from phyblock.text import counted, one_line, some_of
@@ -237,7 +237,7 @@ class ProgressView(progress.Progress):
     def __call__(self, event: RunEvent) -> None:
         """Update the display for an event."""
         of_model = isinstance(event, ModelEvent) and bool(event.model)
-        self._has_asked |= of_model or isinstance(event, SampleDone)
+        self._has_asked |= of_model or isinstance(event, Summary)
         if isinstance(event, RunStarted):
             for name, known in event.earlier.items():
                 number = self.add_task(
@@ -247,9 +247,9 @@ class ProgressView(progress.Progress):
                 self._tallies[name] = tally = Tally(task)
                 for sample in known:
                     tally.add(sample)
-        elif isinstance(event, SampleDone):
-            tally = self._tallies[event.sample.model]
-            tally.add(event.sample)
+        elif isinstance(event, Summary):
+            tally = self._tallies[event.model]
+            tally.add(event)
             self.advance(tally.task.id)
         elif isinstance(event, ModelEvent) and event.kind == "retry":
             tally = self._tallies[event.model]
@@ -266,7 +266,7 @@ class ProgressView(progress.Progress):
             self._print(f"{event.model}: {event.message}" if of_model else event.message)
         else:
             self._print(event.text)
-        if not isinstance(event, SampleDone) or self.get_time() - self._shown_s >= _SHOWN_EVERY_S:
+        if not isinstance(event, Summary) or self.get_time() - self._shown_s >= _SHOWN_EVERY_S:
             self.tick()
 
     def tick(self, asks: bool = False) -> None:

@@ -134,7 +134,7 @@ def models(models_file: str | None) -> None:
     suite = Suite(name="models", models=("random",))
     for name, entry in known.items():
         if (config := plans.to_config(name, entry, suite)).kind != "litellm":
-            rows.append((name, str(config.recording), "", "0, 0"))
+            rows.append((name, str(config.replay), "", "0, 0"))
             continue
         status, tariff = api_key_status(config), tariff_of(config)
         key = f"no {status.variables[0]}" if status.is_needed else "not needed"

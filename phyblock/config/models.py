@@ -14,22 +14,8 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BeforeValidator, ConfigDict, Field, JsonValue, RootModel
 from pydantic.json_schema import SkipJsonSchema
 
-from phyblock.config.validation import (
-    HYPHENATED,
-    Cost,
-    Count,
-    Fault,
-    Flag,
-    ModelName,
-    Section,
-    Text,
-    TimeoutS,
-    Unique,
-    checked,
-    fault,
-    form,
-    read_section,
-)
+from phyblock.config import validation
+from phyblock.config.validation import Cost, Count, Fault, Section, TimeoutS, Unique, checked, form
 from phyblock.config.yaml import read_yaml
 from phyblock.errors import Problem, SpecError
 from phyblock.registry import baseline_names
@@ -92,7 +78,7 @@ def host_of(url: str) -> str:
 
 def _one_or_list(value: object) -> object:
     if value == []:
-        raise fault(Fault("has too few items", "at least 1"))
+        raise validation.fault(Fault("has too few items", "at least 1"))
     return () if value is None else value if isinstance(value, list | tuple) else (value,)
 
 
@@ -113,8 +99,7 @@ class Tariff(Price):
     """The price of a model, if litellm's price map does not have it or is wrong."""
 
     batch: Price | None = None
-    """Prices in batches; null: half at OpenAI's, Anthropic's and Google's own addresses, and the
-    full price at any other."""
+    """Prices in batches; null: half at OpenAI's, Anthropic's and Google's addresses, else full."""
     up_to: Count | None = None
     """Longest prompt for which the price holds [tokens]; the cost of longer ones is unknown, and
     under a cost limit they are not sent. null: any."""
@@ -132,12 +117,12 @@ def _body_faults(body: dict[str, JsonValue]) -> Iterator[Fault]:
 
 
 _Variable = Annotated[str, form(r"^[A-Za-z_][A-Za-z0-9_]*$", "a name such as MY_KEY")]
-_Group = Annotated[str, form(r"^[a-z0-9][a-z0-9-]{0,39}$", f"up to 40 {HYPHENATED}")]
+_Group = Annotated[str, form(r"^[a-z0-9][a-z0-9-]{0,39}$", f"up to 40 {validation.HYPHENATED}")]
 _ID_ALLOWED = "provider/model: openai/gpt-4o-2024-08-06, hosted_vllm/NAME on your own server"
 _Id = Annotated[str, form(r"^[^/ ]+/[^ ]+$", _ID_ALLOWED)]
-_Address = Annotated[
-    str, checked(_address_faults), Field(json_schema_extra={"pattern": "^https?://"})
-]
+_HTTP = Field(json_schema_extra={"pattern": "^https?://"})
+_Address = Annotated[str, checked(_address_faults), _HTTP]
+_Effort = Literal["none", "minimal", "low", "medium", "high", "xhigh", "max"]
 _Temperature = Annotated[float, Field(strict=True, ge=0, le=2)]
 _TopP = Annotated[float, Field(strict=True, gt=0, le=1)]
 
@@ -180,12 +165,10 @@ class ModelConfig(Section):
     api_key_env: _Variable | None = None
     """Environment variable that holds the key, if not the provider's usual one; never the key."""
     transport: Literal["auto", "litellm", "direct"] = "auto"
-    """litellm: through the library. direct: plain HTTP, for servers that speak the OpenAI chat
-    protocol. auto: direct if possible."""
-    batch: Flag = False
+    """litellm: by the library. direct: HTTP in OpenAI's chat protocol. auto: direct if possible."""
+    batch: validation.Flag = False
     """Send requests in the provider's batches (OpenAI and servers with its /files and /batches,
-    Anthropic, Gemini): slower, by up to a day, and cheaper. It is not part of a run's identity and
-    may change before the run is continued."""
+    Anthropic, Gemini): up to a day slower, and cheaper. It may change before a run continues."""
     max_concurrency: Count = 64
     """Maximum number of concurrent calls to this model. If missing: the suite's."""
     rpm: Count | None = None
@@ -199,14 +182,11 @@ class ModelConfig(Section):
     """Above 0, at most 1. If missing: the suite's; null: not sent."""
     max_tokens: Count | None = None
     """Limit of a reply [tokens]. If missing: the suite's; null: not sent."""
-    reasoning_effort: Literal["none", "minimal", "low", "medium", "high", "xhigh", "max"] | None = (
-        None
-    )
+    reasoning_effort: _Effort | None = None
     """Effort of a reasoning model; null: not sent."""
     image_detail: ImageDetail | None = None
-    """Detail of pictures: the `detail` of OpenAI and compatible servers (auto, low, high,
-    original), the media resolution of Gemini (low, medium, high, ultra_high); null: the provider's
-    default. A provider refuses or ignores a value that it does not know."""
+    """Detail of pictures: OpenAI's `detail` (auto, low, high, original), Gemini's media resolution
+    (low, medium, high, ultra_high); null: the provider's default. It may refuse other values."""
     extra_body: Annotated[dict[str, JsonValue], checked(_body_faults)] = Field(default_factory=dict)
     """Further fields of the request body, sent unchanged; not model, messages, n, best_of, stream,
     max_tokens, max_completion_tokens."""
@@ -216,18 +196,17 @@ class ModelConfig(Section):
     """auto: sent if litellm knows that the provider accepts seeds, and to servers named by
     api_base. always, never: sent, or not, in any case. Without seeds, repeats are independent."""
     response_format: Literal["auto", "always", "never"] = "auto"
-    """With answer_format: json_schema in the suite. auto: the schema is sent if litellm knows that
-    the model accepts one, and to OpenAI-compatible servers named by api_base. always, never: sent,
-    or not, in any case. The prompt always describes the format."""
+    """With answer_format: json_schema. auto: the schema is sent if litellm knows that the model
+    accepts one, and to servers named by api_base. always, never: sent, or not, in any case."""
     timeout_s: TimeoutS = 300.0
     """Maximum wait for a whole reply [s]. If missing: the suite's."""
-    published: Text | None = None
+    published: validation.Text | None = None
     """Name of its row in the paper's tables."""
     size_b: TimeoutS | None = None
     """Parameters [billions], if known."""
     groups: Unique[_Group] = ()
     """Its groups; group:NAME in a suite or --models means all models of a group, in file order."""
-    replay: Text | None = None
+    replay: validation.Text | None = None
     """Folder of recorded replies to use instead of an id, relative to this file."""
 
     def faults(self) -> Iterator[Fault]:
@@ -261,19 +240,14 @@ class ModelConfig(Section):
         return "human" if self.name.startswith(HUMAN) else "baseline"
 
     @property
-    def recording(self) -> Path | None:
-        """The folder of recorded replies."""
-        return None if self.replay is None else Path(self.replay)
-
-    @property
     def provider(self) -> str:
         """The part of the id before the first slash, or ""."""
-        return self.id.partition("/")[0] if "/" in self.id else ""
+        return self.id.partition("/")[0]
 
     @property
     def provider_model(self) -> str:
         """The id without the provider: the provider's name for the model."""
-        return self.id.partition("/")[2] if "/" in self.id else self.id
+        return self.id.partition("/")[2]
 
     @property
     def api_base(self) -> str | None:
@@ -299,11 +273,6 @@ class ModelConfig(Section):
         )
 
     @property
-    def sends_format(self) -> bool:
-        """True if `response_format` is sent; else only the prompt describes the format."""
-        return self.response_format == "always"
-
-    @property
     def params(self) -> dict[str, Any]:
         """Sampling parameters to send, by their OpenAI names."""
         names = ("temperature", "top_p", "max_tokens", "reasoning_effort")
@@ -322,7 +291,7 @@ class ModelConfig(Section):
         """
         optional = {
             "revision": self.revision,
-            "response_format": self.sends_format or None,
+            "response_format": self.response_format == "always" or None,
             "image_detail": self.image_detail,
         }
         return {
@@ -338,7 +307,7 @@ class ModelConfig(Section):
 
 def _entry(value: object) -> object:
     if isinstance(value, Mapping) and "name" in value:
-        raise fault(Fault("is not a known key", found="", at=("name",), key=True))
+        raise validation.fault(Fault("is not a known key", found="", at=("name",), key=True))
     return {"id": value} if isinstance(value, str) else value
 
 
@@ -368,7 +337,7 @@ _Entry = Annotated[
 ]
 
 
-class ModelsFile(RootModel[dict[Annotated[ModelName, checked(_name_faults)], _Entry]]):
+class ModelsFile(RootModel[dict[Annotated[validation.ModelName, checked(_name_faults)], _Entry]]):
     """Models by the names used in suites."""
 
     model_config = ConfigDict(json_schema_extra={"additionalProperties": False})
@@ -381,7 +350,7 @@ def load_models(path: Path) -> dict[str, ModelConfig]:
     """
     source = read_yaml(path)
     source.data = {} if source.data is None else source.data
-    models = dict(read_section(ModelsFile, source).root)
+    models = dict(validation.read_section(ModelsFile, source).root)
     for name, config in models.items():
         update = {"name": name}
         if config.replay is not None:

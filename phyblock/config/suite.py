@@ -17,40 +17,15 @@ from typing import Annotated, Any, Literal, Self, TypeVar
 
 from pydantic import BaseModel, Field, PrivateAttr, create_model
 
+from phyblock import types
+from phyblock.config import validation
 from phyblock.config.models import RECORDED, SamplingSpec
-from phyblock.config.validation import (
-    HYPHENATED,
-    BackgroundName,
-    Cost,
-    Count,
-    Fault,
-    ModelName,
-    OneOf,
-    Section,
-    Template,
-    Text,
-    TimeoutS,
-    Unique,
-    UniqueSome,
-    checked,
-    form,
-    read_section,
-)
+from phyblock.config.validation import Count, Fault, Section, Unique, UniqueSome, checked, form
 from phyblock.config.yaml import FieldPath, YamlSource, apply_overrides, dotted, read_yaml
 from phyblock.errors import Problem, SpecError
 from phyblock.files import bundled
 from phyblock.registry import baseline_names, known_track, known_tracks
 from phyblock.text import did_you_mean
-from phyblock.types import (
-    AnswerFormat,
-    CandidateOrder,
-    Criterion,
-    DataFormat,
-    Matcher,
-    PlanParser,
-    Setting,
-    View,
-)
 
 SectionT = TypeVar("SectionT", bound=BaseModel)
 LevelT = TypeVar("LevelT")
@@ -70,9 +45,10 @@ FACTORS: Mapping[str, tuple[str, ...]] = {
 }
 """Factors of `vary` with the path of the field they set; the prompt's depends on the track."""
 
-Prompt = Literal["default", "official"] | Template
+Prompt = Literal["default", "official"] | validation.Template
 Seed = Annotated[int, Field(strict=True, ge=0, le=2**31 - 1)]
-Level = Annotated[int, Field(strict=True), OneOf(lambda: (1, 2, 3, 4, 5))]
+_Order = Annotated[Unique[Literal["goal", "candidates"]], Field(min_length=2, max_length=2)]
+Level = Annotated[int, Field(strict=True), validation.OneOf(lambda: (1, 2, 3, 4, 5))]
 
 
 def _falling(value: tuple[float, float]) -> Iterator[Fault]:
@@ -108,9 +84,9 @@ class DifficultySpec(Section):
 class DatasetSpec(Section):
     """The scenes of a run."""
 
-    format: DataFormat = "builtin"
+    format: types.DataFormat = "builtin"
     """builtin: the project's format. official: a checkout of the official PhyBlock repository."""
-    path: Text | None = None
+    path: validation.Text | None = None
     """builtin: the name of a bundled data set (default: phyblock-400) or a folder that holds
     scenes.jsonl (./name if it is beside the suite). official: the checkout's folder. Relative to
     the suite file, or with --set to the working directory; ~ and $VARIABLES are expanded."""
@@ -122,28 +98,23 @@ class ImagesSpec(Section):
     """The pictures that a model is shown."""
 
     source: Literal["render", "dataset"] = "render"
-    """render: drawn from the scene. dataset: the official composites, whole or cut into their two
-    halves; a scene without one is an error."""
+    """render: drawn from the scene. dataset: the official composites, whole or cut into halves."""
     layout: Literal["composite", "separate"] = "composite"
     """composite: goal and candidates in one picture. separate: two pictures."""
-    order: Annotated[Unique[Literal["goal", "candidates"]], Field(min_length=2, max_length=2)] = (
-        "goal",
-        "candidates",
-    )
+    order: _Order = ("goal", "candidates")
     """Order in which separate pictures are sent."""
     size_px: Annotated[int, Field(strict=True, ge=128, le=2048)] = 512
     """Edge of a rendered picture [pixels]."""
-    view: View = "oblique"
+    view: types.View = "oblique"
     """View of rendered scenes and candidates; questions have their own views."""
-    background: BackgroundName | None = None
-    """Background of all rendered pictures, one of the paper's six. null: each question's own, else
-    the dark checkerboard."""
+    background: validation.BackgroundName | None = None
+    """One of the paper's six backgrounds. null: each question's own, else the dark checkerboard."""
 
 
 class CandidatesSpec(Section):
     """The presentation of candidates."""
 
-    order: CandidateOrder = "file"
+    order: types.CandidateOrder = "file"
     """file: numbered as in the data. shuffled: each seed gives every scene another random order,
     the same for all models; numbers in pictures, prompts and replies follow it."""
 
@@ -151,12 +122,11 @@ class CandidatesSpec(Section):
 class ScoringSpec(Section):
     """The rules of scoring."""
 
-    matchers: UniqueSome[Matcher] = ("optimal", "paper")
+    matchers: UniqueSome[types.Matcher] = ("optimal", "paper")
     """optimal: interchangeable blocks are matched so that as many steps as possible count. paper:
     greedy, the paper's Algorithm 1. The first in the list gives the headline numbers."""
-    level1: Criterion = "selection"
-    """Criterion of Level 1. selection: one-to-one, order ignored. membership: the criterion of the
-    paper's Level-1 columns. aov: as at the other levels."""
+    level1: types.Criterion = "selection"
+    """selection: one-to-one, any order. membership: the paper's. aov: as at the other levels."""
     missing: Literal["count", "skip"] = "count"
     """count: a missing reply placed no block. skip: its scene is excluded, as in the paper."""
 
@@ -172,11 +142,11 @@ class LimitsSpec(Section):
     retry_for_s: Annotated[float, Field(strict=True, ge=0)] = 300.0
     """Longest outage that a run waits out [s]: a sample is not given up sooner after its first
     failure, and a model whose server cannot be reached for longer is stopped."""
-    timeout_s: TimeoutS = 300.0
+    timeout_s: validation.TimeoutS = 300.0
     """Maximum wait for one reply [s]."""
-    batch_poll_s: TimeoutS = 60.0
+    batch_poll_s: validation.TimeoutS = 60.0
     """Maximum time between two polls of a batch [s], for models with batch: true."""
-    max_cost_usd: Cost | None = None
+    max_cost_usd: validation.Cost | None = None
     """The run stops before it costs more than this [USD]; null: no limit."""
 
 
@@ -218,11 +188,11 @@ class VarySpec(Section):
 
     prompt: Levels[Prompt] = ()
     """Prompts, as in the track's own field; for suites of one track."""
-    background: Levels[BackgroundName] = ()
+    background: Levels[validation.BackgroundName] = ()
     """Backgrounds of rendered pictures, as images.background."""
-    view: Levels[View] = ()
+    view: Levels[types.View] = ()
     """Views of rendered scenes, as images.view."""
-    candidate_order: Levels[CandidateOrder] = ()
+    candidate_order: Levels[types.CandidateOrder] = ()
     """Orders of the candidates, as candidates.order."""
     layout: Levels[Literal["composite", "separate"]] = ()
     """Layouts of pictures, as images.layout."""
@@ -283,37 +253,36 @@ class SuiteFiles:
 class Suite(Section):
     """A suite: models, scenes, presentation and scoring."""
 
-    name: Annotated[str, form(r"^[a-z0-9][a-z0-9-]{0,63}$", f"up to 64 {HYPHENATED}")]
+    name: Annotated[str, form(r"^[a-z0-9][a-z0-9-]{0,63}$", f"up to 64 {validation.HYPHENATED}")]
     """Short name: small letters, digits and hyphens. Run folders begin with it."""
     description: str = ""
     """One line on the purpose of the suite."""
-    tracks: UniqueSome[Annotated[str, OneOf(known_tracks)]] = ("full_planning",)
+    tracks: UniqueSome[Annotated[str, validation.OneOf(known_tracks)]] = ("full_planning",)
     """The tracks to run."""
     dataset: DatasetSpec = DatasetSpec()
     levels: UniqueSome[Level] = (1, 2, 3, 4)
     """Difficulty levels; only generated scenes have level 5."""
     limit: Count | None = None
     """Maximum items per track, spread over levels or subtasks; null: all. --limit overrides it."""
-    settings: UniqueSome[Setting] = ("A", "B")
+    settings: UniqueSome[types.Setting] = ("A", "B")
     """A compares type, color and orientation, B type and color. Each reply is scored under all."""
     seeds: UniqueSome[Seed] = (0,)
     """Each seed repeats every question."""
-    models: Literal["recorded"] | UniqueSome[ModelName]
+    models: Literal["recorded"] | UniqueSome[validation.ModelName]
     """Names from models.yaml or built-in baselines, group:NAME for all models of a group; or
     `recorded` for every folder of recorded replies in the official data."""
-    baselines: Unique[Annotated[str, OneOf(baseline_names)]] = ("goal-blind", "random")
+    baselines: Unique[Annotated[str, validation.OneOf(baseline_names)]] = ("goal-blind", "random")
     """Built-in baselines that are scored with the models of full_planning, if every track of the
     suite has them; they cost nothing. []: none. A run with only baselines has those it names."""
     prompt: Prompt = "default"
     """default, official (from the official checkout), or a .j2 template, relative to the suite."""
-    answer_format: AnswerFormat = "text"
+    answer_format: types.AnswerFormat = "text"
     """text: lines of text. json_schema: one JSON object, whose schema the prompt describes; it is
     also sent as response_format if the provider accepts one."""
     images: ImagesSpec = ImagesSpec()
     candidates: CandidatesSpec = CandidatesSpec()
-    parser: PlanParser = "steps"
-    """steps: reads the step list and records the rule that matched. official: the official
-    expression over the whole reply."""
+    parser: types.PlanParser = "steps"
+    """steps: reads the step list. official: the official expression over the whole reply."""
     scoring: ScoringSpec = ScoringSpec()
     sampling: SamplingSpec = SamplingSpec()
     limits: LimitsSpec = LimitsSpec()
@@ -470,7 +439,7 @@ def load_suite(
     if source.data is None:
         raise SpecError(Problem(str(path), "is empty", allowed="a suite"))
     # Varied fields have the values of the reference, wherever a single value is needed.
-    suite = read_section(suite_model(), source).at(Variant())
+    suite = validation.read_section(suite_model(), source).at(Variant())
     problems: list[Problem] = []
 
     def existing(text: str, at: FieldPath, *, is_folder: bool = False) -> Path:
@@ -505,9 +474,8 @@ def load_suite(
         if kind.has_own_data():
             own = getattr(suite, kind.section)
             folders[name] = data(own.path, (kind.section, "path"), own.format == "builtin")
-        prompts: dict[str, FieldPath] = {
-            text: ("vary", "prompt", n) for n, text in enumerate(suite.vary.prompt)
-        }
+        varied = enumerate(suite.vary.prompt)
+        prompts: dict[str, FieldPath] = {text: ("vary", "prompt", n) for n, text in varied}
         own_prompt = str(functools.reduce(getattr, kind.prompt_field(), suite))
         for text, at in (prompts or {own_prompt: kind.prompt_field()}).items():
             template = kind.template_for(suite.answer_format)

@@ -1,7 +1,6 @@
 """Validation against pydantic models: every error in plain words and at its place.
 
-Types describe single values; rules between values are functions that yield `Fault`s. `problems_of`
-translates pydantic's errors, for YAML and for lines of JSON.
+Types describe single values; rules between values yield `Fault`s. `problems_of` puts all in words.
 """
 
 from __future__ import annotations
@@ -12,22 +11,8 @@ from dataclasses import dataclass, replace
 from itertools import islice
 from typing import Annotated, Any, Literal, NamedTuple, Self, TypeVar, get_args
 
-from pydantic import (
-    AfterValidator,
-    BaseModel,
-    ConfigDict,
-    Field,
-    GetCoreSchemaHandler,
-    ValidationError,
-    model_validator,
-)
-from pydantic_core import (
-    CoreSchema,
-    ErrorDetails,
-    InitErrorDetails,
-    PydanticCustomError,
-    core_schema,
-)
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic_core import ErrorDetails, InitErrorDetails, PydanticCustomError, core_schema
 
 from phyblock.config.yaml import FieldPath, YamlSource, dotted, shown
 from phyblock.domain.blocks import BLOCK_TYPES, BlockType
@@ -60,7 +45,6 @@ _MESSAGES: dict[str, tuple[str, str]] = {
     "list_type": (_TYPE, "a list, such as [a, b]"),
     "dict_type": (_TYPE, "a mapping (key: value)"),
     "model_type": (_TYPE, "a mapping (key: value)"),
-    "path_type": (_TYPE, "a path"),
     "is_instance_of": (_TYPE, "a {class}"),
     "finite_number": (_RANGE, "a finite number"),
     "greater_than": (_RANGE, "above {gt}"),
@@ -147,11 +131,10 @@ class OneOf:
     kind: type | None = None
 
     def __get_pydantic_core_schema__(
-        self, source: Any, handler: GetCoreSchemaHandler
-    ) -> CoreSchema:
-        return core_schema.no_info_after_validator_function(
-            self._check, handler(self.kind or source)
-        )
+        self, source: Any, handler: Callable[[Any], core_schema.CoreSchema]
+    ) -> core_schema.CoreSchema:
+        inner = handler(self.kind or source)
+        return core_schema.no_info_after_validator_function(self._check, inner)
 
     def __get_pydantic_json_schema__(self, *_: object) -> dict[str, Any]:
         return {"enum": [*self.choices()]}
@@ -284,9 +267,7 @@ def _fault(detail: ErrorDetails, path: FieldPath, value: Any, model: type[BaseMo
         hint = f'put it in quotes: "{value}"'
     elif kind == "tuple_type" and (listed := _listed(name, value)):
         hint = f"write a list: {listed}"
-    elif (
-        kind == "model_type" and isinstance(value, str) and "path" in _parts(_section(model, path))
-    ):
+    elif kind == "model_type" and type(value) is str and "path" in _parts(_section(model, path)):
         hint = f"write {name}: {{path: {value}}}"
     else:
         allowed = allowed.format_map(context)

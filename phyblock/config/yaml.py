@@ -332,10 +332,9 @@ def apply_overrides(source: YamlSource, overrides: Iterable[str]) -> None:
         try:
             value = parse_yaml(raw, where, base=path).data
         except SpecError as error:
-            problems = [
+            raise SpecError(
                 replace(one, where=where, hint=one.hint or QUOTE_HINT) for one in error.problems
-            ]
-            raise SpecError(problems) from None
+            ) from None
         source.data = {} if source.data is None else source.data
         here, place = source.data, Place(where, where, is_override=True)
         for end, part in enumerate(path[:-1], 1):
@@ -347,7 +346,5 @@ def apply_overrides(source: YamlSource, overrides: Iterable[str]) -> None:
             message = "cannot be set: it is inside a value that is not a mapping"
             raise SpecError(Problem(where, message, dotted(path), shown(here)))
         here[path[-1]] = value
-        below = [one for one in source.places if one[: len(path)] == path]
-        for one in below:
-            del source.places[one]
-        source.places[path] = place
+        others = ((one, at) for one, at in source.places.items() if one[: len(path)] != path)
+        source.places = {**dict(others), path: place}

@@ -1,4 +1,4 @@
-"""Lookup of data sets by name: a folder, a file in it, or a bundled set."""
+"""Lookup of data sets by name: a folder, or a bundled set."""
 
 import os
 from pathlib import Path
@@ -16,7 +16,7 @@ def find_data_set(name: str) -> Path:
     path = Path(name)
     if os.path.lexists(path / SCENES_FILE) or (path / "data").is_dir():
         return path
-    return _file_or_bundled(path, SCENES_FILE, "data set", ", an official checkout")
+    return _bundled(path, SCENES_FILE, "data set", ", an official checkout")
 
 
 def read_data_set(name: str) -> Dataset:
@@ -33,13 +33,11 @@ def open_dataset(layout: str, folder: Path) -> Dataset:
 def find_questions(name: str) -> Path:
     """Return the folder of questions of this name or path, bundled or not. Raises DataError."""
     path = Path(name)
-    return path if path.is_dir() else _file_or_bundled(path, QUESTIONS_FILE, "set of questions")
+    return path if path.is_dir() else _bundled(path, QUESTIONS_FILE, "set of questions")
 
 
-def _file_or_bundled(path: Path, file: str, noun: str, more: str = "") -> Path:
-    """Return the folder of a data file, given by its own path, its folder or a bundled name."""
-    if path.name == file and os.path.lexists(path):
-        return path.parent
+def _bundled(path: Path, file: str, noun: str, more: str = "") -> Path:
+    """Return the folder of a bundled set with this data file."""
     inside = bundled("benchmarks", "data", *path.parts)
     if len(path.parts) == 1 and (inside / file).is_file():
         return inside

@@ -6,9 +6,8 @@
     outputs/<model>/NNN.json                            recorded raw replies (optional)
 
 No released file is labelled level 1; the paper's Level-1 columns score the level-2 scenes without
-order, so a level-2 scene is read as a scene of levels 1 and 2. Question files in the JSON form of
-the paper's appendix A.4 are in a separate folder; docs/vqa.md describes them. Names of models are
-matched to the rows of the paper's Tables 1 and 2.
+order, so a level-2 scene is read as a scene of levels 1 and 2. Question files have the JSON form of
+the paper's appendix A.4 (docs/vqa.md). Names of models are matched to the rows of Tables 1 and 2.
 """
 
 from __future__ import annotations
@@ -24,21 +23,10 @@ from pydantic import Field, TypeAdapter
 
 from phyblock.config.validation import Fault, checked, form
 from phyblock.config.yaml import shown
+from phyblock.data import scenes
 from phyblock.data.base import Dataset, QuestionSet, QuestionTask, read_data, read_each
 from phyblock.data.questions import Options
-from phyblock.data.scenes import (
-    NAME,
-    NAME_ALLOWED,
-    CandidateList,
-    Name,
-    Order,
-    Position,
-    SceneBlocks,
-    StoredCandidate,
-    Text,
-    candidate_set,
-    task_of,
-)
+from phyblock.data.scenes import CandidateList, Name, Order, Position, SceneBlocks, StoredCandidate
 from phyblock.domain.question import (
     LETTERS,
     SUBTASK_NAMES,
@@ -105,19 +93,19 @@ def read_official(root: Path) -> Dataset:
 
     def read(goal: Path, where: str) -> AssemblyTask:
         name, picture = goal.stem, root / _PICTURES / f"{goal.stem}.png"
-        if not re.fullmatch(NAME, name):
-            raise DataError(Problem(where, "is not a name", "the file", name, NAME_ALLOWED))
+        if not re.fullmatch(scenes.NAME, name):
+            raise DataError(Problem(where, "is not a name", "the file", name, scenes.NAME_ALLOWED))
         scene = decode(adapter, read_data(goal), where, _Goal).scene(name)
         path = root / _CANDIDATES / f"{name}_16_cand_blocks.json"
         own = picture if picture.is_file() else None
-        return task_of(scene, read_candidates(path), str(path), own)
+        return scenes.task_of(scene, read_candidates(path), str(path), own)
 
     return Dataset("official", root, read_each(((str(goal), goal) for goal in goals), read))
 
 
 def read_candidates(path: Path) -> CandidateSet:
     """Return the candidate set in a file. Raises DataError with all its problems."""
-    return candidate_set(decode(TypeAdapter(_CandidateFile), read_data(path), str(path)))
+    return scenes.candidate_set(decode(TypeAdapter(_CandidateFile), read_data(path), str(path)))
 
 
 def recorded_models(root: Path) -> dict[str, Path]:
@@ -134,9 +122,8 @@ def recorded_models(root: Path) -> dict[str, Path]:
 def official_prompt(root: Path) -> str:
     """Return the exact official text prompt, from the recordings that include it.
 
-    Those recordings have the goal picture and the candidate picture before the text; the markers of
-    the pictures are removed. If recordings differ, the prompt of the most models is used. Raises
-    DataError if no recording includes one, or none is the most frequent.
+    The markers of the two pictures before the text are removed. If recordings differ, the prompt of
+    the most models is used. Raises DataError if there is none, or none is the most frequent.
     """
     texts: Counter[str] = Counter()
     for folder in recorded_models(root).values():
@@ -158,13 +145,13 @@ def official_prompt(root: Path) -> str:
 class _Question(Line, extra="ignore"):
     id: Name | None = None
     scene_id: str
-    question: Text
+    question: scenes.Text
     options: Options
     answer: str | tuple[str, ...]
 
 
-def read_official_questions(folder: Path, scenes: Dataset) -> QuestionSet:
-    """Return all questions of a folder, about these scenes. Raises DataError with all problems."""
+def read_official_questions(folder: Path, dataset: Dataset) -> QuestionSet:
+    """Return all questions of a folder, about this data set. Raises DataError with all problems."""
     sets = sorted(folder.glob("*.json"))
     if not sets:
         allowed = "question files such as SH.json, one a subtask"
@@ -183,19 +170,18 @@ def read_official_questions(folder: Path, scenes: Dataset) -> QuestionSet:
 
     def read(item: tuple[str, Subtask, _Question], where: str) -> QuestionTask:
         name, subtask, line = item
-        scene = scenes.task(line.scene_id, where, "scene_id").scene
+        scene = dataset.task(line.scene_id, where, "scene_id").scene
         # The picture of the scene may be missing.
         wanted = {"scene": line.scene_id}
         for letter, option in zip(LETTERS, line.options, strict=True):
             wanted |= {letter: f"{name}/{option.strip('<>')}"} if is_picture_option(option) else {}
         files: dict[str, Path] = {}
         for label, picture in wanted.items():
-            paths = [folder / f"images/{picture}{ending}" for ending in (".png", ".jpg", ".jpeg")]
-            if path := next((path for path in paths if path.is_file()), None):
+            path = folder / "images" / f"{picture}.png"
+            if path.is_file():
                 files[label] = path
             elif label != "scene":
-                missing, allowed = "the file is missing", str(paths[0])
-                raise DataError(Problem(where, missing, "options", allowed=allowed))
+                raise DataError(Problem(where, "the file is missing", "options", allowed=str(path)))
         # The right options are given as letters or as the options themselves.
         is_order = subtask == "OR"
         parts = [line.answer] if isinstance(line.answer, str) else list(line.answer)

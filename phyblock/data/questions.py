@@ -14,26 +14,9 @@ from pydantic import Field, StrictInt, TypeAdapter
 
 from phyblock.config.validation import BackgroundName, Fault, SubtaskName, checked
 from phyblock.config.yaml import shown
-from phyblock.data.base import (
-    Dataset,
-    QuestionSet,
-    QuestionTask,
-    lines_of,
-    read_each,
-    read_set,
-    report,
-)
-from phyblock.data.scenes import (
-    MAX_BLOCKS,
-    Angles,
-    Format,
-    Name,
-    Position,
-    StoredBlock,
-    StoredKind,
-    Text,
-    View,
-)
+from phyblock.data import base, scenes
+from phyblock.data.base import Dataset, QuestionSet, QuestionTask
+from phyblock.data.scenes import Angles, Format, Name, Position, StoredBlock, StoredKind, Text, View
 from phyblock.domain.blocks import Color
 from phyblock.domain.question import (
     LETTERS,
@@ -70,7 +53,8 @@ class StoredMark(Line, extra="ignore"):
 
 
 # The blocks of several outcomes, so that all of their pictures have the same frame.
-_Framed = Annotated[tuple[StoredBlock, ...], Field(min_length=1, max_length=4 * MAX_BLOCKS)]
+_Framed = Annotated[tuple[StoredBlock, ...], Field(min_length=1, max_length=4 * scenes.MAX_BLOCKS)]
+_SOME = Field(min_length=1, max_length=scenes.MAX_BLOCKS)
 
 
 class StoredPicture(Line, extra="forbid"):
@@ -80,15 +64,15 @@ class StoredPicture(Line, extra="forbid"):
     """Its content: the scene, the block asked about, or the option of this letter."""
     view: View
     """Azimuth (0 from +x, 90 from +y) and elevation of the camera [degrees]."""
-    without: Annotated[tuple[StrictInt, ...], Field(min_length=1, max_length=MAX_BLOCKS)] = ()
+    without: Annotated[tuple[StrictInt, ...], _SOME] = ()
     """Orders of blocks that are not drawn."""
     poses: dict[str, StoredPose] = Field(default_factory=dict)
     """Poses of blocks that are not at their place, by order."""
     swap: dict[str, StoredKind] = Field(default_factory=dict)
     """Kinds of blocks that differ from the scene, by order."""
-    add: Annotated[tuple[StoredBlock, ...], Field(min_length=1, max_length=MAX_BLOCKS)] = ()
+    add: Annotated[tuple[StoredBlock, ...], _SOME] = ()
     """Blocks that the scene does not have, as whole entries."""
-    marks: Annotated[tuple[StoredMark, ...], Field(min_length=1, max_length=MAX_BLOCKS)] = ()
+    marks: Annotated[tuple[StoredMark, ...], _SOME] = ()
     """Places."""
     framed: Literal[True] | _Framed = ()
     """Blocks that the camera is framed on; true: the whole scene; missing: all drawn blocks."""
@@ -249,16 +233,16 @@ class StoredQuestion(Line, extra="forbid"):
             yield Fault("no picture marks the places", allowed, shown(unmarked), ("pictures",))
 
 
-def read_questions(folder: Path, scenes: Dataset) -> QuestionSet:
-    """Return all questions of a folder, about these scenes. Raises DataError with all problems."""
+def read_questions(folder: Path, dataset: Dataset) -> QuestionSet:
+    """Return all questions of a folder, about this data set. Raises DataError with all problems."""
     adapter = TypeAdapter(StoredQuestion)
 
     def read(line: bytes, where: str) -> QuestionTask:
         stored = decode(adapter, line, where, StoredQuestion)
-        scene = scenes.task(stored.scene_id, where, "scene_id").scene
-        report(stored.faults(scene), where)
+        scene = dataset.task(stored.scene_id, where, "scene_id").scene
+        base.report(stored.faults(scene), where)
         return QuestionTask(stored.about(scene))
 
     path = folder / QUESTIONS_FILE
-    tasks = read_each(lines_of(path, read_set(path), "question"), read)
+    tasks = base.read_each(base.lines_of(path, base.read_set(path), "question"), read)
     return QuestionSet(folder.name, folder, tasks)

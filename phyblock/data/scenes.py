@@ -173,15 +173,11 @@ def _look_faults(candidates: Sequence[StoredCandidate]) -> Iterator[Fault]:
 
 
 SceneBlocks = Annotated[
-    tuple[SceneBlock, ...],
-    Field(min_length=1, max_length=MAX_BLOCKS),
-    checked(_block_faults),
+    tuple[SceneBlock, ...], Field(min_length=1, max_length=MAX_BLOCKS), checked(_block_faults)
 ]
 """Blocks with unique orders whose dependencies have no cycle."""
 CandidateList = Annotated[
-    tuple[_CandidateT, ...],
-    Field(min_length=1, max_length=MAX_CANDIDATES),
-    checked(_look_faults),
+    tuple[_CandidateT, ...], Field(min_length=1, max_length=MAX_CANDIDATES), checked(_look_faults)
 ]
 """Candidates of which no two look the same."""
 Levels = Annotated[tuple[StrictInt, ...], OneOf(lambda: _LEVELS)]
@@ -200,8 +196,7 @@ class StoredScene(Line, extra="ignore"):
     blocks: Annotated[SceneBlocks, checked(_layer_faults)]
     """The goal structure: 1 to 40 blocks."""
     candidates: CandidateList[StoredCandidate]
-    """1 to 16 candidates, numbered from 1 in this order. No two may look the same, and every block
-    needs one that looks like it."""
+    """1 to 16 candidates, numbered from 1. No two look the same, and every block has its like."""
     format: Format = 1
     """Version of the line; default 1."""
 

@@ -20,17 +20,8 @@ from urllib.parse import urlsplit
 from phyblock.config.models import ModelConfig, host_of
 from phyblock.errors import ModelError, RetryableError, UnavailableError
 from phyblock.files import load_json
-from phyblock.models.client import (
-    OPENAI_API_BASE,
-    Answer,
-    HttpClient,
-    api_key,
-    error_of,
-    hidden,
-    malformed,
-    secrets_of,
-    shown,
-)
+from phyblock.models import client
+from phyblock.models.client import Answer, HttpClient
 
 T = TypeVar("T")
 Post = tuple[str, bytes, Mapping[str, str]]
@@ -60,10 +51,9 @@ class BatchStatus:
 class BatchProvider(ABC):
     """One provider's batches: `create`, `status` and `results`.
 
-    Methods raise ModelErrors, which contain no key. Everything is sent with `headers`, in which the
-    model's key is inserted, and only to the model's server. A batch is at `url` and its id;
-    `named_in` says where the provider shows phyblock's name for it. The limits are below those of
-    each provider, since a batch is kept in memory.
+    Methods raise ModelErrors without keys. Everything is sent with `headers` and the model's key,
+    only to the model's server. A batch is at `url` and its id; `named_in` says where the provider
+    shows phyblock's name for it. The limits are below the providers': a batch is kept in memory.
     """
 
     most_requests = 50_000
@@ -75,7 +65,7 @@ class BatchProvider(ABC):
         self._config = config
         self._base = base
         self._url = url
-        self._secrets = secrets_of(config)
+        self._secrets = client.secrets_of(config)
         self.http = HttpClient(_TRANSFER_S, _LARGEST_RESULTS_BYTES)
 
     @abstractmethod
@@ -104,7 +94,7 @@ class BatchProvider(ABC):
         """Return the lines of a batch's results, without keys."""
         bodies = [await self._call(lambda answer: answer.body, url) for url in status.results]
         text = b"\n".join(bodies).decode("utf-8", "surrogateescape")
-        return hidden(text, self._secrets, guess=False).encode("utf-8", "surrogateescape")
+        return client.hidden(text, self._secrets, guess=False).encode("utf-8", "surrogateescape")
 
     @abstractmethod
     def read(self, line: Any) -> tuple[str, Answer | str]:
@@ -129,7 +119,7 @@ class BatchProvider(ABC):
         word, answered, errors = words
         said = "; ".join(f"{error.get('code')} {error.get('message')}" for error in errors or ())
         text = f"{word}, {answered or 0} answered{': ' if said else ''}{said}"
-        return BatchStatus(name, state, shown(text, self._secrets), tuple(results))
+        return BatchStatus(name, state, client.shown(text, self._secrets), tuple(results))
 
     async def _call(
         self,
@@ -143,19 +133,19 @@ class BatchProvider(ABC):
             if urlsplit(url)[:2] != urlsplit(self._base)[:2]:
                 why = f"nothing is sent to {host_of(url)}, which is not the model's server"
                 raise UnavailableError(why, sent="no")
-            key = api_key(self._config) or ""
+            key = client.api_key(self._config) or ""
             own = {name: value.replace("{key}", key) for name, value in self.headers.items()}
             sent = {"Content-Type": "application/json", **own, **(headers or {})}
             method = "GET" if body is None else "POST"
             answer = await self.http.send(url, body or b"", sent, method=method)
             if answer.fault or not answer.is_success:
-                raise error_of(answer)
+                raise client.error_of(answer)
             try:
                 return read(answer)
             except UNREADABLE as error:
-                raise malformed(answer.status, f"{type(error).__name__}: {error}") from None
+                raise client.malformed(answer.status, f"{type(error).__name__}: {error}") from None
         except ModelError as error:
-            error.args = (shown(str(error), self._secrets),)
+            error.args = (client.shown(str(error), self._secrets),)
             raise
 
     def _status_in(self, answer: Answer) -> BatchStatus:
@@ -169,7 +159,7 @@ class _OpenAI(BatchProvider):
     named_in = "in its metadata"
 
     def __init__(self, config: ModelConfig) -> None:
-        base = (config.api_base or OPENAI_API_BASE).rstrip("/")
+        base = (config.api_base or client.OPENAI_API_BASE).rstrip("/")
         super().__init__(config, base, f"{base}/batches")
 
     def line(self, custom_id: str, body: bytes, headers: Mapping[str, str]) -> bytes:  # noqa: ARG002
@@ -352,5 +342,5 @@ def _object(answer: Answer) -> Any:
     found: Any = load_json(answer.body)
     # A failed batch has its error beside its name.
     if found.get("error") and not found.keys() & {"id", "name"}:
-        raise error_of(answer)
+        raise client.error_of(answer)
     return found

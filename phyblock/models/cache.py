@@ -17,7 +17,8 @@ from pathlib import Path
 from weakref import WeakValueDictionary
 
 from phyblock.config.models import ModelConfig
-from phyblock.errors import Problem, StoreError, reason_of
+from phyblock.errors import Problem, StoreError
+from phyblock.files import make_folder
 from phyblock.models.request import Image, Request, wire_params
 from phyblock.records.record import Reply
 from phyblock.text import hex_digest
@@ -70,10 +71,7 @@ class ReplyCache(contextlib.AbstractContextManager["ReplyCache"]):
         self._report = report
         self._is_off = False
         self._locks: WeakValueDictionary[str, asyncio.Lock] = WeakValueDictionary()
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise self._problem(f"cannot be made: {reason_of(error)}") from error
+        make_folder(path.parent, _HINT)
         try:
             self._db = sqlite3.connect(path, timeout=_BUSY_TIMEOUT_S, isolation_level=None)
             try:

@@ -1,8 +1,7 @@
 """Parts of both clients: keys, one HTTP client with bounds, the reply in an answer, or its error.
 
-Redirects are not followed, so that keys and prompts go only to the host that was named. A body is
-read up to a limit. The time limit applies to the whole exchange, whatever the server does. Nothing
-is sent twice. aiohttp is imported by the first call.
+No redirect is followed: keys and prompts go only to the named host. A body is read up to a limit.
+The time limit applies to the whole exchange, whatever a server does. Nothing is sent twice.
 """
 
 from __future__ import annotations
@@ -23,17 +22,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from phyblock import errors
 from phyblock.config.models import ADDRESS_ALLOWED, ModelConfig, host_of, is_address
-from phyblock.errors import (
-    DataError,
-    ModelError,
-    Problem,
-    RefusedError,
-    RetryableError,
-    SampleError,
-    SpecError,
-    UnavailableError,
-)
 from phyblock.files import load_json
 from phyblock.models.request import Request, json_body, wire_params
 from phyblock.records.record import Reply, Usage
@@ -156,11 +146,11 @@ def api_key(config: ModelConfig) -> str | None:
     if status.key is not None:
         if not all(" " <= character <= "~" for character in status.key):
             why = f"{names} holds a line break or another character that no header can carry"
-            raise UnavailableError(why, sent="no")
+            raise errors.UnavailableError(why, sent="no")
         return status.key
     if status.is_needed:
         why = f"no API key for {config.name}: set {names} in the environment"
-        raise UnavailableError(why, sent="no")
+        raise errors.UnavailableError(why, sent="no")
     return None if config.provider in _OWN_CREDENTIALS else _PLACEHOLDER
 
 
@@ -177,7 +167,7 @@ def server_address(model_id: str) -> str | None:
             if not is_address(value):
                 message = "is not an address that can be used"
                 where = f"environment variable {name}"
-                raise SpecError(Problem(where, message, allowed=ADDRESS_ALLOWED))
+                raise errors.SpecError(errors.Problem(where, message, allowed=ADDRESS_ALLOWED))
             return value
     return None
 
@@ -265,7 +255,7 @@ class Client(ABC):
         started_s = time.perf_counter()
         try:
             reply = await self._complete(request, seed)
-        except ModelError as error:
+        except errors.ModelError as error:
             error.args = (shown(str(error), self._secrets),)
             raise
         texts = {
@@ -366,14 +356,14 @@ class HttpClient:
         except (aiohttp.ConnectionTimeoutError, aiohttp.ClientConnectorError) as error:
             host = error.host if isinstance(error, aiohttp.ClientProxyConnectionError) else host
             said = f"no connection to {host}: {getattr(error, 'os_error', error)}"
-            raise RetryableError(said, sent="no") from None
+            raise errors.RetryableError(said, sent="no") from None
         except TimeoutError:
             within = f"no whole answer within {self._timeout_s:g} s"
-            raise RetryableError(within, sent="maybe") from None
+            raise errors.RetryableError(within, sent="maybe") from None
         except (aiohttp.ClientError, OSError) as error:
             said = f"{type(error).__name__}: {error}".strip(": ")
             lost = f"the connection to {host} was lost ({said})"
-            raise RetryableError(lost, sent="lost") from None
+            raise errors.RetryableError(lost, sent="lost") from None
 
     async def _read(self, response: aiohttp.ClientResponse) -> tuple[bytes, str]:
         """Return the body, or b"" and its problem."""
@@ -457,12 +447,12 @@ def read_completion(body: object, status: int = 200) -> Reply:
     return raw
 
 
-def malformed(status: int, why: str) -> RetryableError:
+def malformed(status: int, why: str) -> errors.RetryableError:
     """Return the error of a success without a reply: it was answered, and may be billed."""
-    return RetryableError(f"HTTP {status}: malformed reply: {why}", status=status)
+    return errors.RetryableError(f"HTTP {status}: malformed reply: {why}", status=status)
 
 
-def error_of(answer: Answer) -> ModelError:
+def error_of(answer: Answer) -> errors.ModelError:
     """Return the error of an answer without a reply.
 
     An error that came with a success status is classified by its own code: a reached limit or a
@@ -477,14 +467,15 @@ def error_of(answer: Answer) -> ModelError:
         code = next((int(one) for one in codes if _PASSING.fullmatch(one)), status)
         code = next((one for one in _UNAVAILABLE if str(one) in codes), code)
     if code < 500 and _POLICY.search(words):
-        return RefusedError(text, status=status)
+        return errors.RefusedError(text, status=status)
     if code in _UNAVAILABLE or (code < 500 and _NEVER.search(words)):
-        return UnavailableError(text, status=status)
+        return errors.UnavailableError(text, status=status)
     if answer.is_success or code >= 500 or code in _RETRYABLE:
-        return RetryableError(text, status=code, retry_after_s=retry_after_s(answer.headers))
+        return errors.RetryableError(text, status=code, retry_after_s=retry_after_s(answer.headers))
     if 300 <= status < 400:
-        return UnavailableError(f"{text} (is api_base the address of the API?)", status=status)
-    return SampleError(text, status=status)
+        text += " (is api_base the address of the API?)"
+        return errors.UnavailableError(text, status=status)
+    return errors.SampleError(text, status=status)
 
 
 def _words(body: bytes) -> tuple[str, tuple[str, ...]]:
@@ -517,9 +508,8 @@ def retry_after_s(headers: Mapping[str, str]) -> float | None:
 def read_raw_reply(raw: object, where: str) -> Reply:
     """Return the reply in a decoded JSON document; `where` names it in errors.
 
-    It may have any shape of the official outputs: chat completions, Anthropic messages, Gemini
-    responses (as written by the REST API or its Python client), and a text under `predict`, `text`
-    or `response`. Raises DataError for any other.
+    It has a shape of the official outputs: chat completion, Anthropic message, Gemini response (of
+    REST or Python), or a text under `predict`, `text` or `response`. Else raises DataError.
     """
     for read in (read_chat_completion, _anthropic, _gemini):
         if (reply := read(raw)) is not None:
@@ -528,7 +518,8 @@ def read_raw_reply(raw: object, where: str) -> Reply:
         return _reply(text)
     found = f"keys {', '.join(map(str, raw))}" if isinstance(raw, Mapping) else type(raw).__name__
     allowed = "a chat completion, an Anthropic message, a Gemini response, predict, text, response"
-    raise DataError(Problem(where, "is not a recorded reply of a known shape", "", found, allowed))
+    message = "is not a recorded reply of a known shape"
+    raise errors.DataError(errors.Problem(where, message, "", found, allowed))
 
 
 def read_chat_completion(raw: object) -> Reply | None:
@@ -632,9 +623,7 @@ def _parts(content: object) -> tuple[str, str]:
 
 
 def _get(raw: object, *paths: str) -> Any:
-    """Return the first value other than null at one of the paths, such as `choices.0.text`, else
-    None. The name 0 stands for the first item of a list.
-    """
+    """Return the first value but null at these paths; 0 names a first item: `choices.0.text`."""
     for path in paths:
         value = raw
         for name in path.split("."):

@@ -171,9 +171,8 @@ class Budget:
 class ModelBudget:
     """The calls of one model within a run's budget, and what is learned from its replies.
 
-    The largest ratios of real to estimated tokens are kept, for prompts and for replies, so that
-    reserves adapt to providers that count more. Under a limit, one call is sent first, and then at
-    most one more at once than have been settled: 1, 2, 4, ...
+    The largest ratios of real to estimated tokens are kept: reserves adapt to providers that count
+    more. Under a limit, at most one more call is in progress than have been settled: 1, 2, 4, ...
     """
 
     def __init__(self, run: Budget, tariff: Tariff | None = None) -> None:
@@ -200,9 +199,8 @@ class ModelBudget:
     async def reserve(self, expected: Estimate, *, batched: bool = False) -> Reservation | None:
         """Reserve the most that a call can cost when there is room; None without a price.
 
-        It is computed again whenever a call has settled, since more is known of the model then.
-        Calls of a batch do not wait for the first ones. Raises BudgetReachedError if it exceeds the
-        limit with no call in progress, and as `most_usd`.
+        It is computed again when a call settles. Calls of a batch do not wait for the first ones.
+        Raises BudgetReachedError if it exceeds the limit with no call under way, and as `most_usd`.
         """
         run = self._run
         while (usd := self.most_usd(expected, batched=batched)) is not None:
@@ -287,15 +285,11 @@ def estimate(config: ModelConfig, request: Request) -> Estimate:
     return Estimate(math.ceil(texts) + pictures, min(usual, most), most)
 
 
-def most_usd(
-    tariff: Tariff, prompt_tokens: float, reply_tokens: int, *, batched: bool = False
-) -> float:
-    """Return the most US dollars that a call can cost, if all of its prompt is written to a cache.
-    The prompt has a margin, since its tokens are estimated.
-    """
-    price, prompt = price_at(tariff, batched=batched), prompt_tokens * _PROMPT_MARGIN
-    prompt_usd = prompt * max(price.input, price.cache_write or 0.0)
-    return (prompt_usd + reply_tokens * price.output) / 1_000_000
+def most_usd(tariff: Tariff, prompt: float, reply: int, *, batched: bool = False) -> float:
+    """Return the most a call can cost [USD], by its tokens: with a cache written, and a margin."""
+    price = price_at(tariff, batched=batched)
+    prompt_usd = prompt * _PROMPT_MARGIN * max(price.input, price.cache_write or 0.0)
+    return (prompt_usd + reply * price.output) / 1_000_000
 
 
 def may_be_billed(error: ModelError) -> bool:

@@ -20,18 +20,8 @@ from urllib.parse import urlsplit
 
 from phyblock.config.models import DIRECT_PROVIDERS, ModelConfig
 from phyblock.errors import DataError, RefusedError, RetryableError, UnavailableError
-from phyblock.models.client import (
-    KEYLESS,
-    Answer,
-    Client,
-    HttpClient,
-    api_key,
-    error_of,
-    malformed,
-    read_completion,
-    read_json,
-    read_raw_reply,
-)
+from phyblock.models import client
+from phyblock.models.client import Answer, Client, HttpClient
 from phyblock.models.costs import map_entries
 from phyblock.models.request import Request, wire_messages, wire_params
 from phyblock.records.record import Reply, Usage
@@ -99,7 +89,7 @@ class LitellmClient(Client):
             "max_retries": 0,
             "client": self._sender,
             "no-log": True,
-            "api_key": api_key(config),
+            "api_key": client.api_key(config),
             "api_base": config.api_base,
             "seed": seed,
         }
@@ -118,25 +108,25 @@ class LitellmClient(Client):
             said = f"{type(error).__name__}: {str(error).partition('Traceback (most recent')[0]}"
             if answer is None and config.provider in _OWN_CLIENTS:
                 status = getattr(error, "status_code", None) or 500
-                raise error_of(Answer(status, {}, said.encode())) from None
+                raise client.error_of(Answer(status, {}, said.encode())) from None
             if answer is None:
                 # A package, a credential or a setting is missing: every request would fail.
                 raise UnavailableError(said, sent="no") from None
             if not answer.is_success:
-                failure = error_of(answer)
+                failure = client.error_of(answer)
                 if isinstance(error, litellm.ContentPolicyViolationError):
                     failure = RefusedError(str(failure), status=answer.status)
                 raise failure from None
             # litellm could not read what phyblock may.
             with contextlib.suppress(DataError):
-                reply = read_raw_reply(read_json(answer), "")
+                reply = client.read_raw_reply(client.read_json(answer), "")
                 if reply.text:
                     return reply.model_copy(update={"usage": Usage()})
-            raise malformed(answer.status, said) from None
+            raise client.malformed(answer.status, said) from None
         finally:
             _CURRENT.reset(token)
         status = exchange.answer.status if exchange.answer else 200
-        return read_completion(response.model_dump(), status)
+        return client.read_completion(response.model_dump(), status)
 
 
 def _sender(config: ModelConfig) -> Any:
@@ -165,7 +155,7 @@ def _sender(config: ModelConfig) -> Any:
                 sent = {k: v for k, v in request.headers.items() if k not in _OURS}
                 answer = await exchange.http.send(url, await request.aread(), sent, method=method)
                 if answer.fault or answer.is_success:
-                    read_json(answer)
+                    client.read_json(answer)
             except Exception as failure:
                 exchange.failure = failure
                 # Its message may contain what litellm must not log.
@@ -176,11 +166,11 @@ def _sender(config: ModelConfig) -> Any:
             body = answer.body if answer.is_success else answer.body[:_MOST_ERROR_BYTES]
             return httpx.Response(answer.status, headers=headers, content=body, request=request)
 
-    client = httpx.AsyncClient(transport=Wire(), trust_env=False, follow_redirects=False)
-    fields: dict[str, Any] = {"http_client": client, "max_retries": 0, "timeout": config.timeout_s}
+    http = httpx.AsyncClient(transport=Wire(), trust_env=False, follow_redirects=False)
+    fields: dict[str, Any] = {"http_client": http, "max_retries": 0, "timeout": config.timeout_s}
     if config.provider == "azure":
         return openai.AsyncAzureOpenAI(
-            api_key=api_key(config),
+            api_key=client.api_key(config),
             azure_ad_token=os.environ.get("AZURE_AD_TOKEN"),
             azure_endpoint=config.api_base or "",
             api_version=os.environ.get("AZURE_API_VERSION") or _litellm().AZURE_DEFAULT_API_VERSION,
@@ -190,11 +180,13 @@ def _sender(config: ModelConfig) -> Any:
     class Sender(AsyncHTTPHandler):  # type: ignore[misc]
         def __init__(self) -> None:
             super().__init__(timeout=config.timeout_s)
-            self.client = client
+            self.client = http
 
         @cached_property
         def _sdk(self) -> Any:
-            return openai.AsyncOpenAI(api_key=api_key(config), base_url=config.api_base, **fields)
+            return openai.AsyncOpenAI(
+                api_key=client.api_key(config), base_url=config.api_base, **fields
+            )
 
         def __getattr__(self, name: str) -> Any:
             if name.startswith("__"):
@@ -234,7 +226,7 @@ def be_quiet() -> None:
 def known_providers(config: ModelConfig) -> frozenset[str]:
     """Return known providers; litellm is imported only if the model has none of the usual ones."""
     mapped = (str(entry.get("litellm_provider", "")) for entry in map_entries().values())
-    usual = frozenset((*DIRECT_PROVIDERS, *KEYLESS, *filter(None, mapped)))
+    usual = frozenset((*DIRECT_PROVIDERS, *client.KEYLESS, *filter(None, mapped)))
     if config.provider in usual:
         return usual
     return usual | {str(getattr(one, "value", one)) for one in _litellm().provider_list}

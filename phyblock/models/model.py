@@ -10,43 +10,20 @@ from collections.abc import AsyncIterator, Awaitable, Callable, Iterator
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Literal
 
-from tenacity import (
-    AsyncRetrying,
-    RetryCallState,
-    retry_if_exception_type,
-    wait_combine,
-    wait_random_exponential,
-)
+import tenacity
 
 from phyblock.config.models import DIRECT_PROVIDERS, ModelConfig
 from phyblock.errors import ModelError, Problem, RetryableError, SpecError, UnavailableError
+from phyblock.models import costs
 from phyblock.models.cache import ReplyCache, reply_key
 from phyblock.models.client import Client, HttpClient, OpenAIClient
-from phyblock.models.costs import (
-    Budget,
-    Estimate,
-    ModelBudget,
-    Reservation,
-    cost_usd,
-    estimate,
-    map_entry,
-    may_be_billed,
-    tariff_of,
-)
+from phyblock.models.costs import Budget, Estimate, ModelBudget, Reservation
 from phyblock.models.replay import open_baseline, open_replay
 from phyblock.models.request import Journal, Model, Request
 from phyblock.records.record import Call, Reply
 
 if TYPE_CHECKING:
     from phyblock.models.batch import BatchFiles
-
-
-@dataclass(frozen=True)
-class Clock:
-    """The clock of limits, retries and servers, which tests replace."""
-
-    now: Callable[[], float] = time.monotonic
-    sleep: Callable[[float], Awaitable[None]] = asyncio.sleep
 
 
 @dataclass(frozen=True)
@@ -74,7 +51,7 @@ class RetryPolicy:
     the first. An unreadable answer with HTTP 2xx was paid for, so only `attempts` apply to it.
 
     The wait before attempt n + 1 is uniform between 0 and min(`max_wait_s`, `base_s` * 2^(n-1)), on
-    top of the server's `Retry-After` (followed up to `max_retry_after_s`).
+    top of the server's `Retry-After` (followed up to `max_retry_after_s`), by `now` and `sleep`.
     """
 
     attempts: int = 8
@@ -82,36 +59,37 @@ class RetryPolicy:
     base_s: float = 0.5
     max_wait_s: float = 60.0
     max_retry_after_s: float = 120.0
-    clock: Clock = field(default_factory=Clock)
+    now: Callable[[], float] = time.monotonic
+    sleep: Callable[[float], Awaitable[None]] = asyncio.sleep
 
     def followed_s(self, error: ModelError) -> float:
         """Return the part of the server's requested wait that is followed [s]."""
         return min(getattr(error, "retry_after_s", None) or 0.0, self.max_retry_after_s)
 
-    def retrying(self, model: str, report: Report) -> AsyncRetrying:
+    def retrying(self, model: str, report: Report) -> tenacity.AsyncRetrying:
         """Return tenacity's loop for a request that repeats RetryableErrors and reports waits."""
         failed_s: list[float] = []
 
-        def error_of(state: RetryCallState) -> RetryableError:
+        def error_of(state: tenacity.RetryCallState) -> RetryableError:
             error = state.outcome.exception() if state.outcome is not None else None
             assert isinstance(error, RetryableError)
             return error
 
-        def stop(state: RetryCallState) -> bool:
+        def stop(state: tenacity.RetryCallState) -> bool:
             # tenacity's stop_after_delay would count the wait for a place before the first attempt.
-            failed_s.append(self.clock.now())
+            failed_s.append(self.now())
             was_paid = 200 <= (error_of(state).status or 0) < 300
             is_over = was_paid or failed_s[-1] - failed_s[0] >= self.retry_for_s
             return is_over and state.attempt_number >= self.attempts
 
-        return AsyncRetrying(
-            sleep=self.clock.sleep,
+        return tenacity.AsyncRetrying(
+            sleep=self.sleep,
             stop=stop,
-            wait=wait_combine(
-                wait_random_exponential(self.base_s, self.max_wait_s),
+            wait=tenacity.wait_combine(
+                tenacity.wait_random_exponential(self.base_s, self.max_wait_s),
                 lambda state: self.followed_s(error_of(state)),
             ),
-            retry=retry_if_exception_type(RetryableError),
+            retry=tenacity.retry_if_exception_type(RetryableError),
             before_sleep=lambda state: report(
                 ModelEvent(model, "retry", str(error_of(state)), state.upcoming_sleep)
             ),
@@ -175,7 +153,7 @@ class Servers:
     def _rests_s(self, server: Server) -> float:
         if server.is_tried:
             return math.inf
-        return max(0.0, server.cool_at_s - self.policy.clock.now())
+        return max(0.0, server.cool_at_s - self.policy.now())
 
     @contextlib.contextmanager
     def chosen(self, failed: Server | None = None) -> Iterator[Server]:
@@ -183,8 +161,9 @@ class Servers:
 
         It is chosen when the request is admitted, so that a server that is down gets only one.
         """
+        all_usable = self.usable()
         server = min(
-            self.usable(), key=lambda s: (self._rests_s(s), s is failed, s.under_way, s.chosen)
+            all_usable, key=lambda s: (self._rests_s(s), s is failed, s.under_way, s.chosen)
         )
         is_trial = server.failures > 1 and not server.is_tried
         server.is_tried |= is_trial
@@ -202,7 +181,7 @@ class Servers:
         A server is given up if it refuses every request, or fails many times in a row for as long
         as a request is retried, at most `_STARTING_S` if it has never answered.
         """
-        policy, now_s = self.policy, self.policy.clock.now()
+        policy, now_s = self.policy, self.policy.now()
         server.was_heard |= error.status is not None
         is_down = error.sent in ("no", "lost") or error.status in _GATEWAY
         if is_down and sent_s >= server.cool_at_s:
@@ -239,7 +218,7 @@ class Limits:
         self._under_way = asyncio.Semaphore(config.max_concurrency)
         self._overall = overall
         self._servers = servers
-        self._clock = servers.policy.clock
+        self._policy = servers.policy
         self._request_s = 60.0 / config.rpm if config.rpm else 0.0
         self._token_s = 60.0 / config.tpm if config.tpm else 0.0
         self._next_by_requests_s = self._next_by_tokens_s = float("-inf")
@@ -256,9 +235,9 @@ class Limits:
             async with self._admission:
                 while (wait_s := self._wait_s()) > 0:
                     # In short waits, since tokens may be released or the last server given up.
-                    await self._clock.sleep(min(wait_s, 1.0))
+                    await self._policy.sleep(min(wait_s, 1.0))
                 await self._overall.acquire()
-                now_s = self._clock.now()
+                now_s = self._policy.now()
                 self._next_by_requests_s = now_s + self._request_s
                 self._next_by_tokens_s = now_s + self._token_s * tokens
             try:
@@ -273,14 +252,12 @@ class Limits:
 
     def _wait_s(self) -> float:
         next_s = max(self._next_by_requests_s, self._next_by_tokens_s)
-        return max(self._servers.cooling_s(), next_s - self._clock.now())
+        return max(self._servers.cooling_s(), next_s - self._policy.now())
 
 
 @dataclass
 class _Call:
-    """A request with its estimate, attempts, cost, and the server that failed last. If
-    `is_cancelled`, it is not sent again.
-    """
+    """A request with its attempts, cost and last failed server; not repeated if `is_cancelled`."""
 
     request: Request
     key: str
@@ -321,8 +298,9 @@ class ChatModel:
         cache, alone = self.cache, contextlib.nullcontext()
         async with alone if cache is None else cache.shared(key):
             if cache is not None and (kept := cache.get(key)) is not None:
-                return kept.model_copy(update={"cost_usd": cost_usd(self.budget.tariff, kept)})
-            call = _Call(request, key, estimate(self.config, request))
+                usd = costs.cost_usd(self.budget.tariff, kept)
+                return kept.model_copy(update={"cost_usd": usd})
+            call = _Call(request, key, costs.estimate(self.config, request))
             retrying = self.policy.retrying(self.name, self.report)
             try:
                 reply: Reply = await retrying(self._attempt, call)
@@ -356,8 +334,7 @@ class ChatModel:
     async def _exchange(self, call: _Call, server: Server, held: Reservation | None) -> Reply:
         """Record that a call is sent, send it, and record its end.
 
-        A failure that may have been billed counts in full; a failure before anything is sent, and
-        an internal error, which ends the run, cost nothing.
+        A failure counts in full if it may have been billed; an unsent call and a bug cost nothing.
         """
         written: Call | None = None
         reply: Reply | None = None
@@ -368,7 +345,7 @@ class ChatModel:
                 written = await self.journal.sent(self.name, sample, call.key, most_usd)
                 if call.is_cancelled:
                     raise asyncio.CancelledError
-            spent_usd, sent_s = None, self.policy.clock.now()
+            spent_usd, sent_s = None, self.policy.now()
             call.sent += 1
             self.under_way += 1
             try:
@@ -376,7 +353,7 @@ class ChatModel:
             finally:
                 self.under_way -= 1
             server.was_heard, server.failures = True, 0
-            spent_usd = cost_usd(self.budget.tariff, reply)
+            spent_usd = costs.cost_usd(self.budget.tariff, reply)
             reply = reply.model_copy(update={"cost_usd": spent_usd, "attempts": call.sent})
             self.budget.learn(call.expected, reply.usage)
             prompt, completion = reply.usage.prompt_tokens, reply.usage.completion_tokens
@@ -385,7 +362,7 @@ class ChatModel:
         except ModelError as error:
             call.failed_at = server
             self.servers.failed(server, error, sent_s)
-            is_free = isinstance(error, UnavailableError) or not may_be_billed(error)
+            is_free = isinstance(error, UnavailableError) or not costs.may_be_billed(error)
             spent_usd = 0.0 if is_free else None
             if is_free:
                 self.limits.release(call.expected.most_tokens)
@@ -411,11 +388,10 @@ class ChatModel:
 def takes_format(config: ModelConfig) -> bool:
     """True if a model is assumed to accept a JSON schema as `response_format`.
 
-    Self-hosted servers that speak the OpenAI protocol (vLLM, SGLang, llama.cpp, LM Studio, Ollama)
-    do; for all others litellm's map of models decides.
+    Own servers of the OpenAI protocol (vLLM, SGLang, ...) do; others if litellm's map says so.
     """
     is_own = config.provider in DIRECT_PROVIDERS and bool(config.addresses)
-    return is_own or bool(map_entry(config).get("supports_response_schema"))
+    return is_own or bool(costs.map_entry(config).get("supports_response_schema"))
 
 
 def build_model(
@@ -440,7 +416,7 @@ def build_model(
     if config.kind == "replay":
         return open_replay(config)
     policy = policy or RetryPolicy()
-    tariff = tariff_of(config)
+    tariff = costs.tariff_of(config)
     own = ModelBudget(budget or Budget(), tariff)
     if own.is_limited and tariff is None:
         hint = "give it a price in models.yaml, or run without max_cost_usd"

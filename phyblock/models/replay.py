@@ -6,16 +6,18 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from phyblock.config.models import ModelConfig
 from phyblock.errors import DataError, Problem, RefusedError, SampleError, SpecError, reason_of
-from phyblock.files import load_json, read_text
+from phyblock.files import read_bytes
 from phyblock.models.client import read_raw_reply
 from phyblock.models.request import Request
 from phyblock.records.files import RECORDS, RecordLines
-from phyblock.records.record import Record, Reply, Usage
+from phyblock.records.record import Record, Reply, Usage, decode
 from phyblock.registry import baseline_names, baseline_rules
 from phyblock.text import drawn_bytes
 
@@ -34,8 +36,7 @@ class LocalModel:
     async def ask(self, request: Request) -> Reply | None:
         """Return the answer to the request, or None if nothing was recorded.
 
-        Raises the recorded error; DataError for an unreadable recording, or if an oracle lacks a
-        candidate; SpecError for a track that a baseline has no rule for.
+        Raises the recorded error, DataError for a broken one, SpecError for a track without a rule.
         """
         reply = self.answer(request)
         return None if reply is None else reply.model_copy(update=_FREE)
@@ -47,13 +48,9 @@ class LocalModel:
 def open_replay(config: ModelConfig) -> LocalModel:
     """Open the recording of a configuration.
 
-    A folder with `records.jsonl` is a run of phyblock, any other a folder of raw replies. Raises
-    DataError if there is no such folder, or no JSON in it.
+    With `records.jsonl` it is a run, else raw replies. Raises DataError if it is missing or empty.
     """
-    folder, name = config.recording, config.name
-    if folder is None or not folder.is_dir():
-        where, found = f"model {name}", str(folder)
-        raise DataError(Problem(where, "recordings not found", "replay", found, "a folder"))
+    folder, name = Path(config.replay or ""), config.name
     if not (folder / RECORDS).is_file():
         if not any(folder.glob("*.json")):
             allowed = f"a file a scene such as 000.json, or {RECORDS}"
@@ -108,10 +105,7 @@ def _read_file(folder: Path, request: Request) -> Reply | None:
     if not path.is_file():
         return None
     try:
-        raw = load_json(read_text(path))
-    except OSError as error:
+        data = read_bytes(path)
+    except (OSError, ValueError) as error:
         raise DataError(Problem(str(path), f"cannot be read: {reason_of(error)}")) from error
-    except ValueError as error:
-        where = f"{path}:{getattr(error, 'lineno', 1)}:{getattr(error, 'colno', 1)}"
-        raise DataError(Problem(where, f"is not JSON: {error}")) from error
-    return read_raw_reply(raw, str(path))
+    return read_raw_reply(decode(TypeAdapter(Any), data, str(path)), str(path))

@@ -68,9 +68,8 @@ class Request:
     """One question to a model.
 
     `key` names the question inside its `track`; recordings are looked up by both. `params` are
-    sampling parameters by their OpenAI names; `prompt_version` is a digest of the template;
-    `subject` is the input of baselines, whose type depends on the track. `response_format` asks for
-    JSON, None for text. `sample` is the id of its sample.
+    sampling parameters by their OpenAI names, `prompt_version` is a digest of the template,
+    `subject` the input of baselines, `sample` an id. `response_format` asks for JSON, not text.
     """
 
     key: str
@@ -142,7 +141,7 @@ def wire_params(config: ModelConfig, request: Request) -> dict[str, Any]:
     overridden by the model's, and the answer format if the model accepts one; None is not sent.
     """
     merged = {**request.params, **config.params}
-    if config.sends_format and request.response_format is not None:
+    if config.response_format == "always" and request.response_format is not None:
         merged["response_format"] = request.response_format
     return {name: value for name, value in merged.items() if value is not None}
 

@@ -22,18 +22,8 @@ from phyblock.config.validation import Fault, checked, problems_of
 from phyblock.config.yaml import parse_yaml
 from phyblock.errors import DataError, InputError, Problem, StoreError, reason_of
 from phyblock.files import NotRegularError, open_regular, read_bytes, read_text
-from phyblock.records.record import (
-    BatchLine,
-    Call,
-    Line,
-    Prompt,
-    PromptMessage,
-    Record,
-    Stopped,
-    decode,
-    not_a,
-    validated,
-)
+from phyblock.records import record
+from phyblock.records.record import BatchLine, Call, Line, Prompt, PromptMessage, Record, Stopped
 from phyblock.registry import known_tracks
 
 FORMAT = 1
@@ -43,8 +33,6 @@ _HINT = "run.yaml is written by `phyblock run` and never edited: restore it from
 _DIGITS = 16
 _LARGEST_BYTES = 2 * 1024 * 1024
 """Far above the manifest of the largest allowed suite."""
-
-
 Version = Annotated[int, Field(ge=1)]
 
 
@@ -145,10 +133,8 @@ class Manifest(Line):
 
     def selects(self, model: str, seed: int) -> bool:
         """True if the run includes this model and seed; records of others may exist."""
-        seeds = self.suite.get("seeds")
-        return seed in (seeds or [seed]) and (
-            not self.models or any(model == one.name for one in self.models)
-        )
+        seeds = self.suite.get("seeds") or [seed]
+        return seed in seeds and model in ([one.name for one in self.models] or [model])
 
 
 def read_manifest(folder: Path) -> Manifest:
@@ -164,14 +150,14 @@ def read_manifest(folder: Path) -> Manifest:
         message = f"cannot be read: {reason_of(error)}"
         raise StoreError(Problem(str(path), message, hint=_HINT)) from error
     except InputError as error:
-        raise not_a("run manifest", error, _HINT) from error
+        raise record.not_a("run manifest", error, _HINT) from error
 
 
 @functools.lru_cache(maxsize=2)
 def _manifest(text: str, where: str) -> Manifest:
     """Return a manifest; cached, since one command reads it several times."""
     source = parse_yaml(text, where, _LARGEST_BYTES, may_hold_keys=True)
-    return validated(Manifest, source.data, source)
+    return record.validated(Manifest, source.data, source)
 
 
 def suite_of(manifest: Manifest, where: str) -> Suite:
@@ -198,8 +184,7 @@ LineT = TypeVar("LineT", bound=Line)
 class Validation:
     """Checks that records and calls belong to a run, by its digest and their names.
 
-    `samples` are all ids of the run, if its plan is known. Records of models and seeds that the run
-    does not select now are skipped, except with `whole`.
+    `samples` are all ids, if known. Unless `whole`, records not selected by the run are skipped.
     """
 
     manifest: Manifest
@@ -210,8 +195,8 @@ class Validation:
         """True if a line is not skipped."""
         return self.whole or not isinstance(line, Record) or self._selects(line)
 
-    def _selects(self, record: Record) -> bool:
-        return self.manifest.selects(record.model, record.seed)
+    def _selects(self, line: Record) -> bool:
+        return self.manifest.selects(line.model, line.seed)
 
     def problem(self, where: str, line: Line) -> Problem | None:
         """Return the evidence that a record or call belongs to another run, or None."""
@@ -291,12 +276,9 @@ class Lines(Generic[LineT]):
                         yield where, line
         except FileNotFoundError:
             return
-        except OSError as error:
-            raise StoreError(
-                Problem(str(self.path), f"cannot be read: {error.strerror}")
-            ) from error
-        except NotRegularError as error:
-            raise StoreError(Problem(str(self.path), str(error))) from error
+        except (OSError, NotRegularError) as error:
+            message = f"cannot be read: {reason_of(error)}"
+            raise StoreError(Problem(str(self.path), message)) from error
 
     def at(self, starts: Iterable[int]) -> Iterator[LineT]:
         """Yield the lines that begin at these offsets [bytes], which were read before."""
@@ -311,9 +293,9 @@ class Lines(Generic[LineT]):
             message = f"is longer than {_LONGEST_LINE_BYTES // 1024**2} MB"
             raise StoreError(Problem(where, message, hint=self.hint))
         try:
-            return decode(self._adapter, data, where, self.kind)
+            return record.decode(self._adapter, data, where, self.kind)
         except DataError as error:
-            raise not_a(self.noun, error, self.hint) from error
+            raise record.not_a(self.noun, error, self.hint) from error
 
 
 def _is_cut(line: bytes) -> bool:
@@ -420,9 +402,9 @@ def newest_starts(lines: RecordLines, tracks: Collection[str] | None = None) -> 
     Only samples of `tracks` are included, or all if it is None.
     """
     starts: dict[str, int] = {}
-    for _, record in lines:
-        if tracks is None or record.track in tracks:
-            starts[record.sample] = lines.start_bytes
+    for _, line in lines:
+        if tracks is None or line.track in tracks:
+            starts[line.sample] = lines.start_bytes
     return starts
 
 

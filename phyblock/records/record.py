@@ -1,7 +1,6 @@
 """Lines of a run's files: replies, records, calls, prompts, batches.
 
-`Record` declares the fields that all tracks share. A track declares its own in a subclass, with its
-name as the literal type of `track`.
+`Record` has the fields of all tracks; a track adds its own in a subclass, with its name as `track`.
 """
 
 from __future__ import annotations
@@ -34,8 +33,7 @@ def _finite(value: Any) -> Any:
 class Line(BaseModel):
     """A JSON object in a run's files, or a part of one.
 
-    Fields keep their declared order. Only fields that were given are written, including unknown
-    ones, so that a line is written back as it was read.
+    Given fields, also unknown ones, are written in declared order: a line stays as it was read.
     """
 
     # Building is deferred because most commands read one kind of line, if any.
@@ -81,8 +79,7 @@ def decode(
 ) -> ValueT:
     """Return JSON text as validated by `adapter`, without type coercion.
 
-    Raises DataError with all problems; `kind` is the model of the value. Lone surrogates, which no
-    output could hold, become U+FFFD.
+    Raises DataError with all problems; `kind` is the model. Lone surrogates become U+FFFD.
     """
     try:
         return adapter.validate_json(data, strict=True)
@@ -121,8 +118,6 @@ def _storable(value: Any) -> Any:
 
 
 BatchEvent = Literal["intended", "created", "lost", "ended"]
-
-
 ErrorKind = Literal["retryable", "sample", "refused", "unavailable", "unjudged"]
 
 _NumberT = TypeVar("_NumberT", int, float)
@@ -179,18 +174,14 @@ class Reply(Line):
     def storable(self) -> Self:
         """Return the reply with all its fields, ready to be written.
 
-        It is paid for, so nothing in it is an error: absurd numbers become unknown, and characters
-        that no file could hold become U+FFFD.
+        It is paid for, so nothing is an error: absurd numbers are unknown, lone surrogates U+FFFD.
         """
         held, usage = vars(self), self.usage
         fields = {name: held[name] for name in Reply.model_fields}
-        fields |= {
-            name: well_formed(text) for name, text in fields.items() if isinstance(text, str)
-        }
+        fields |= {name: well_formed(one) for name, one in fields.items() if isinstance(one, str)}
         fields |= {name: _within(held[name], 0) for name in ("cost_usd", "billed_usd")}
-        counts = {
-            name: _within(getattr(usage, name), -LARGEST_WHOLE) for name in Usage.model_fields
-        }
+        known = {name: getattr(usage, name) for name in Usage.model_fields}
+        counts = {name: _within(count, -LARGEST_WHOLE) for name, count in known.items()}
         return self.model_copy(update={**fields, "usage": usage.model_copy(update=counts)})
 
     @property
@@ -383,9 +374,8 @@ class Record(Line):
     def course(self, matcher: str) -> Course | None:
         """Return the steps of an assembly by a matcher, or None if it was not scored by it."""
         assemblies = [score for score in self.scores if score.why is not None]
-        score = next(
-            (one for one in assemblies if one.matcher == matcher), next(iter(assemblies), None)
-        )
+        first = next(iter(assemblies), None)
+        score = next((one for one in assemblies if one.matcher == matcher), first)
         if score is None:
             return None
         names = (self.parsed_text or "").split()

@@ -75,27 +75,14 @@ def make_manifest(
     for name in _LIBRARIES:
         with contextlib.suppress(PackageNotFoundError):
             libraries[name] = version(name)
+    place = {"format": suite.dataset.format, "root": str(dataset.root)}
     fields = {
         "identity": hex_digest(json.dumps(inputs, sort_keys=True, separators=(",", ":"))),
         "created": datetime.now(UTC).isoformat(timespec="seconds"),
         **inputs,
         "suite": suite.model_dump(mode="json"),
-        "models": [
-            {
-                "name": model.name,
-                **_model(model),
-                "published": model.published,
-                "size_b": model.size_b,
-                **({"served_at": model.addresses} if model.addresses else {}),
-            }
-            for model in models
-        ],
-        "dataset": {
-            **data,
-            "version": data_version,
-            "format": suite.dataset.format,
-            "root": str(dataset.root),
-        },
+        "models": [_model(model) for model in models],
+        "dataset": {**data, "version": data_version, **place},
         **asked_counts(suite, dataset, variants[Variant()]),
         "versions": {"python": platform.python_version(), **libraries, **code_versions()},
     }
@@ -124,14 +111,15 @@ def code_versions() -> dict[str, str]:
 
 
 def _model(model: ModelConfig) -> dict[str, object]:
-    """Return what determines a model's replies; for a recording its content, not its path."""
-    folder = model.recording
-    if folder is None:
-        return model.identity()
-    digest = hashlib.sha256()
-    for path in sorted((*folder.glob("*.json"), *folder.glob("records.jsonl"))):
-        digest.update(f"{path.name} {digest_of_file(path)}\n".encode())
-    return {**model.identity(), "recording": digest.hexdigest()}
+    """Return the entry of a model; a recording is identified by its content, not its path."""
+    fields = {"name": model.name, **model.identity()}
+    if model.replay is not None:
+        digest, folder = hashlib.sha256(), Path(model.replay)
+        for path in sorted((*folder.glob("*.json"), *folder.glob("records.jsonl"))):
+            digest.update(f"{path.name} {digest_of_file(path)}\n".encode())
+        fields["recording"] = digest.hexdigest()
+    fields |= {"published": model.published, "size_b": model.size_b}
+    return fields | ({"served_at": model.addresses} if model.addresses else {})
 
 
 def differences(found: Manifest, wanted: Manifest) -> list[str]:

@@ -18,33 +18,19 @@ from phyblock.data.lookup import open_dataset
 from phyblock.data.official import match_published, recorded_models
 from phyblock.errors import Problem, SpecError
 from phyblock.files import bundled, reply_cache_file
+from phyblock.models import costs
 from phyblock.models.cache import ReplyCache, reply_key
 from phyblock.models.client import api_key_status, server_address
-from phyblock.models.costs import Estimate as CallEstimate
-from phyblock.models.costs import estimate as estimate_call
-from phyblock.models.costs import is_billed, is_free, most_usd, price_at, tariff_of
 from phyblock.models.model import takes_format
 from phyblock.models.request import Request
-from phyblock.records.files import (
-    MANIFEST,
-    BatchLines,
-    Manifest,
-    read_manifest,
-    run_records,
-    suite_of,
-)
+from phyblock.records import files
+from phyblock.records.files import BatchLines, Manifest
 from phyblock.registry import track_baselines
 from phyblock.run.manifest import make_manifest
 from phyblock.run.store import held_run
 from phyblock.text import did_you_mean, drawn_bytes
-from phyblock.tracks.base import (
-    Item,
-    Track,
-    interleaved,
-    kind_of,
-    open_tracks,
-    select_tasks,
-)
+from phyblock.tracks import base
+from phyblock.tracks.base import Item, Track
 from phyblock.tracks.pictures import Workshop
 
 _SEEDS = 2**31
@@ -106,7 +92,7 @@ class RunPlan:
     def samples(self, model: ModelConfig) -> Iterator[Sample]:
         """Yield samples by seed, condition, track and item, interleaved over levels and scenes."""
         asked = [
-            (variant, track, interleaved(track.items))
+            (variant, track, base.interleaved(track.items))
             for variant, tracks in self.variants.items()
             for track in tracks
         ]
@@ -148,7 +134,7 @@ def make_plan(
     for variant in suite.vary.variants:
         # Repeats share their tracks.
         shown = variants.get(variant.shown)
-        variants[variant] = shown or open_tracks(suite.at(variant), dataset, limit, shop)
+        variants[variant] = shown or base.open_tracks(suite.at(variant), dataset, limit, shop)
     tracks = variants[Variant()]
     if problems := list(_conflicts(models, tracks, suite)):
         raise SpecError(problems)
@@ -161,7 +147,7 @@ def make_plan(
     for track in (track for opened in variants.values() for track in opened if asks):
         # PromptError where a prompt cannot be rendered for the first item, before anything is.
         next(iter(track.outlines(track.items[0])), None) if track.items else None
-    selected = replace(dataset, tasks=select_tasks(dataset.tasks, suite, limit))
+    selected = replace(dataset, tasks=base.select_tasks(dataset.tasks, suite, limit))
     manifest = make_manifest(suite, models, selected, variants, limit)
     return RunPlan(suite, models, selected, variants, manifest)
 
@@ -182,18 +168,18 @@ def _conflicts(
         if is_replay and (varied := ", ".join(suite.vary.factors)):
             yield Problem(where, "is a recording, which cannot be varied", "vary", varied)
             continue
-        if model.recording is not None:
+        if model.replay is not None:
             # Raw replies were made as in the paper.
             made = {"candidates.order": "file", "answer_format": "text"}
-            if (path := model.recording / MANIFEST).is_file():
-                recorded = suite_of(read_manifest(model.recording), str(path)).at(Variant())
-                made = {field: attrgetter(field)(recorded) for field in made}
+            if (path := Path(model.replay, files.MANIFEST)).is_file():
+                recorded = files.suite_of(files.read_manifest(path.parent), str(path))
+                made = {field: attrgetter(field)(recorded.at(Variant())) for field in made}
             for field, was in made.items():
                 if was != (now := attrgetter(field)(suite)):
                     message = f"is a recording that was made with {field}: {was}"
                     yield Problem(where, message, field, now, was)
         for track in tracks:
-            name, plays, able = track.name, track.plays, track_baselines(kind_of(track.name))
+            name, plays, able = track.name, track.plays, track_baselines(base.kind_of(track.name))
             if is_replay and plays:
                 message = f"is a recording, which cannot answer in {name}"
                 yield Problem(where, message, "tracks")
@@ -235,12 +221,8 @@ def _planned_models(
         found = resolve_models(suite.models, known, lambda at: suite.where("models", at))
     asks = any(model.kind != "baseline" for model in found.values())
     if asks and "full_planning" in suite.tracks:
-        able = [kind_of(name).baselines for name in suite.tracks]
-        more = [
-            name
-            for name in suite.baselines
-            if name not in found and all(name in rules for rules in able)
-        ]
+        able = set.intersection(*(set(base.kind_of(name).baselines) for name in suite.tracks))
+        more = [name for name in suite.baselines if name in able and name not in found]
         found = {**found, **resolve_models(more, known, lambda _: "models")}
     return tuple(
         to_config(name, config, suite).model_copy(
@@ -326,7 +308,7 @@ class Estimate:
         if self.tariff is not None:
             self.cost_usd = self.most_usd = 0.0
 
-    def add_call(self, expected: CallEstimate) -> None:
+    def add_call(self, expected: costs.Estimate) -> None:
         """Count one call to be made, with a reply of typical length."""
         self.calls += 1
         prompt, reply = expected.prompt_tokens, expected.completion_tokens
@@ -334,15 +316,14 @@ class Estimate:
         self.reply_tokens += reply
         if self.tariff is not None and self.cost_usd is not None and self.most_usd is not None:
             batched, most = self.model.batch, expected.most_completion_tokens
-            price = price_at(self.tariff, batched=batched)
+            price = costs.price_at(self.tariff, batched=batched)
             self.cost_usd += (prompt * price.input + reply * price.output) / 1_000_000
-            self.most_usd += most_usd(self.tariff, prompt, most, batched=batched)
+            self.most_usd += costs.most_usd(self.tariff, prompt, most, batched=batched)
 
     @property
     def may_cost(self) -> bool:
         """True if there are calls to make that are not known to be free."""
-        is_priced = self.tariff is None or not is_free(self.tariff)
-        return self.calls > 0 and is_priced and is_billed(self.model)
+        return self.calls > 0 and costs.is_billed(self.model)
 
 
 def estimate(
@@ -352,11 +333,11 @@ def estimate(
 
     With `retry_failed`, rejected requests count. Raises StoreError for another run's folder.
     """
-    rows = {m.name: Estimate(m, plan.samples_per_model, tariff_of(m)) for m in plan.models}
+    rows = {m.name: Estimate(m, plan.samples_per_model, costs.tariff_of(m)) for m in plan.models}
     settled: dict[str, bool] = {}
     waiting: set[str] = set()
     if held_run(folder, plan.manifest) is not None:
-        for _, record in run_records(folder, plan.manifest, plan.sample_ids()):
+        for _, record in files.run_records(folder, plan.manifest, plan.sample_ids()):
             settled[record.sample] = record.is_answered if retry_failed else record.is_final
         if lines := tuple(line for _, line in BatchLines(folder)):
             from phyblock.models.batch import under_way
@@ -380,7 +361,7 @@ def estimate(
                 elif key in waiting:
                     row.waiting += 1
                 else:
-                    row.add_call(estimate_call(row.model, asked))
+                    row.add_call(costs.estimate(row.model, asked))
     return list(rows.values())
 
 
@@ -388,7 +369,7 @@ def may_bill(
     plan: RunPlan, folder: Path, *, use_cache: bool, retry_failed: bool = False
 ) -> list[Estimate]:
     """Return the estimates of a plan if any of its models may cost money, else none."""
-    if not any(is_billed(model) for model in plan.models):
+    if not any(costs.is_billed(model) for model in plan.models):
         return []
     rows = estimate(plan, folder, use_cache=use_cache, retry_failed=retry_failed)
     return rows if any(row.may_cost for row in rows) else []

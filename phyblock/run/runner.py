@@ -1,8 +1,7 @@
 """A run from its folder to its last record: request, model, judgement, record on disk.
 
-A session emits events and prints nothing. It stops cleanly: it sends nothing more and waits for
-calls in progress, because they are paid for. Replies that have arrived are written whatever ends
-it, even an internal error or a cancellation.
+A session emits events and prints nothing. To stop, it sends nothing more and waits for calls in
+progress, since they are paid for. Whatever ends it, even a bug, replies that arrived are written.
 """
 
 from __future__ import annotations
@@ -22,15 +21,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeVar
 
+from phyblock import errors
 from phyblock.config.models import ModelConfig
-from phyblock.errors import (
-    BudgetReachedError,
-    ModelError,
-    Problem,
-    SpecError,
-    StoreError,
-    UnavailableError,
-)
 from phyblock.files import reply_cache_file
 from phyblock.models.cache import ReplyCache, reply_key
 from phyblock.models.costs import Budget
@@ -39,7 +31,7 @@ from phyblock.models.request import HaltedError, Model, Request
 from phyblock.records.files import BATCHES
 from phyblock.records.record import Record, Reply
 from phyblock.run.plan import RunPlan, Sample
-from phyblock.run.store import RunStore, Summary, begun, judge_episode, judge_reply
+from phyblock.run.store import Answer, RunStore, Summary, begun, judge_episode, judge_reply
 from phyblock.text import counted
 from phyblock.tracks.base import Item
 
@@ -53,13 +45,6 @@ class RunStarted:
 
     expected: int
     earlier: Mapping[str, Sequence[Summary]]
-
-
-@dataclass(frozen=True)
-class SampleDone:
-    """A record was written; `sample` is its summary."""
-
-    sample: Summary
 
 
 @dataclass(frozen=True)
@@ -80,7 +65,8 @@ class Stopping:
 
 
 _INTERRUPTED = Stopping("interrupted", "interrupted")
-RunEvent = RunStarted | SampleDone | ModelEvent | Stopping
+RunEvent = RunStarted | Summary | ModelEvent | Stopping
+"""A summary is emitted when its record was written."""
 
 _Result = TypeVar("_Result")
 _LOCAL_AT_ONCE = max(8, os.cpu_count() or 1)
@@ -182,7 +168,7 @@ class Session:
                     await self._ask_all()
                 except BaseException:
                     # If the disk is full, the error that ended the run comes first.
-                    with contextlib.suppress(StoreError):
+                    with contextlib.suppress(errors.StoreError):
                         self._note_stopped()
                     raise
                 self._note_stopped()
@@ -195,25 +181,23 @@ class Session:
         """Open store, cache and models on the stack, queue the samples, and emit the progress."""
         plan, result, limits = self.plan, self.result, self.plan.suite.limits
         stack.callback(plan.close)
-        samples = {planned.name: list(plan.samples(planned)) for planned in plan.models}
-        ids = frozenset(sample.id for each in samples.values() for sample in each)
+        samples = [sample for planned in plan.models for sample in plan.samples(planned)]
+        ids = frozenset(sample.id for sample in samples)
         self._store = store = RunStore(self.folder, plan.manifest, ids)
         stack.callback(store.close)
         progress = store.progress
         earlier: dict[str, list[Summary]] = {name: [] for name in self._queues}
-        for name, queue in self._queues.items():
-            for sample in samples[name]:
-                known = progress.samples.get(sample.id)
-                if known and (known.is_answered if self.retry_failed else known.is_final):
-                    earlier[name].append(known)
-                    result.add(known)
-                else:
-                    queue.append(sample)
+        for sample in samples:
+            known = progress.samples.get(sample.id)
+            if known and (known.is_answered if self.retry_failed else known.is_final):
+                earlier[known.model].append(known)
+                result.add(known)
+            else:
+                self._queues[sample.model.name].append(sample)
         most_usd = math.inf if limits.max_cost_usd is None else limits.max_cost_usd
         cache: ReplyCache | None = None
         if self.use_cache and any(model.kind == "litellm" for model in plan.models):
-            cache = ReplyCache(reply_cache_file(), partial(self._notice, ""))
-            stack.callback(cache.close)
+            cache = stack.enter_context(ReplyCache(reply_cache_file(), self._notice))
         for file in (store.batches, store.calls):
             stack.push_async_callback(file.drain)
         build = partial(
@@ -233,7 +217,7 @@ class Session:
         result.unanswered = progress.unanswered_text
         self.watch(RunStarted(plan.samples_per_model, earlier))
         if result.unanswered:
-            self._notice("", result.unanswered)
+            self._notice(result.unanswered)
 
     def _batch_files(self, model: ModelConfig) -> BatchFiles | None:
         """Return the files of the batches of a model, if it is asked in batches.
@@ -253,11 +237,12 @@ class Session:
             message = "has a batch in progress, whose questions would be asked twice"
             hint = f"let it end with batch: true, or remove its lines from {BATCHES} to give it up"
             where = f"model {model.name}"
-            raise SpecError(Problem(where, message, "batch", waiting[0].shown, hint=hint))
+            problem = errors.Problem(where, message, "batch", waiting[0].shown, hint=hint)
+            raise errors.SpecError(problem)
         return None
 
-    def _notice(self, model: str, text: str) -> None:
-        self.watch(ModelEvent(model, "notice", text))
+    def _notice(self, text: str) -> None:
+        self.watch(ModelEvent("", "notice", text))
 
     def _note_stopped(self) -> None:
         result = self.result
@@ -312,8 +297,8 @@ class Session:
                 await self._store.records.put(record)
                 summary = Summary.of(record)
                 self.result.add(summary)
-                self.watch(SampleDone(summary))
-            except UnavailableError as error:
+                self.watch(summary)
+            except errors.UnavailableError as error:
                 queue.clear()
                 if model not in self.result.stopped:
                     self.result.stopped[model] = str(error)
@@ -322,7 +307,7 @@ class Session:
                         # It may wait for another attempt, which would fail too.
                         if task.get_name() == model:
                             task.cancel()
-            except BudgetReachedError as error:
+            except errors.BudgetReachedError as error:
                 self._stop(Stopping("cost", str(error)))
             except HaltedError:
                 return
@@ -392,7 +377,7 @@ class Session:
             episode.take(replies[-1], fields["prompt"])
         return judge_episode(track, item, fields, episode, replies)
 
-    async def _answer(self, sample: Sample, request: Request) -> Reply | ModelError | None:
+    async def _answer(self, sample: Sample, request: Request) -> Answer:
         """Return the reply, or an error that concerns only this sample."""
         name, request = sample.model.name, replace(request, sample=sample.id)
         ask = self._models[name].ask
@@ -400,9 +385,9 @@ class Session:
             ask = partial(self._ask_once, sample.model)
         try:
             return await self._until_stopped(ask(request))
-        except UnavailableError:
+        except errors.UnavailableError:
             raise
-        except ModelError as error:
+        except errors.ModelError as error:
             return error
 
     async def _ask_once(self, model: ModelConfig, request: Request) -> Reply | None:
@@ -420,7 +405,7 @@ class Session:
         return reply
 
     def _fields(
-        self, sample: Sample, item: Item, request: Request | None, answer: Reply | ModelError | None
+        self, sample: Sample, item: Item, request: Request | None, answer: Answer
     ) -> dict[str, Any]:
         """Return the fields of a record before it is judged."""
         track, model = sample.track, sample.model
@@ -431,14 +416,12 @@ class Session:
         if request is not None and request.messages and track.prompt is not None:
             fields["prompt"] = self._store.keep_prompt(request, track.prompt.name)
         if request is not None and request.response_format and model.kind == "litellm":
-            fields["asked"] = "response_format" if model.sends_format else "prompt"
+            fields["asked"] = "response_format" if model.response_format == "always" else "prompt"
         return fields
 
 
 async def to_its_end(work: Coroutine[Any, Any, _Result]) -> tuple[_Result, bool]:
-    """Return the result of work, which a cancellation does not stop, and whether the waiting task
-    was cancelled meanwhile; raises what the work raises.
-    """
+    """Return the result of work that no cancellation stops, and True if one was asked for."""
     task = asyncio.create_task(work)
     is_cancelled = False
     while not task.done():

@@ -1,8 +1,7 @@
 """The records of a run: judged, written, replaced; `run.yaml`, written first, and other files.
 
-A record counts only when it is appended and synced, so a kill at any moment loses nothing that was
-written; a line that a kill cut short is dropped when the run is opened again. A later record of a
-sample replaces an earlier one.
+A record counts once it is appended and synced, so a kill loses nothing that was written; a line
+that it cut short is dropped when the run is opened again. A later record replaces an earlier one.
 """
 
 from __future__ import annotations
@@ -19,58 +18,20 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from io import FileIO
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 from phyblock.config.yaml import dump_yaml
-from phyblock.errors import (
-    ModelError,
-    Problem,
-    RefusedError,
-    RetryableError,
-    SampleError,
-    SimulationError,
-    StoreError,
-)
+from phyblock.errors import ModelError, Problem, SimulationError, StoreError
 from phyblock.files import LIST, OutFolder, append_whole, atomic_write, sync_folder, writing
 from phyblock.models.request import Image, Request
-from phyblock.records.files import (
-    BATCHES,
-    CALLS,
-    MANIFEST,
-    PROMPTS,
-    RECORDS,
-    STOPPED,
-    BatchLines,
-    CallLines,
-    Lines,
-    Manifest,
-    PromptLines,
-    RecordLines,
-    Validation,
-    read_manifest,
-    read_stopped,
-    run_records,
-)
-from phyblock.records.record import (
-    BatchLine,
-    Call,
-    ErrorKind,
-    Line,
-    Record,
-    Reply,
-    SentImage,
-    SentPrompt,
-    Stopped,
-    StoredError,
-    Usage,
-)
+from phyblock.records import files
+from phyblock.records.files import Lines, LineT, Manifest
+from phyblock.records.record import BatchLine, Call, Line, Record, Reply, SentPrompt, StoredError
 from phyblock.run.manifest import code_versions, differences
 from phyblock.scoring.plan import Counts
 from phyblock.text import counted, hex_digest, plain_sum, some_of, well_formed
 from phyblock.tracks.base import Episode, Item, Judgement, Track
 from phyblock.types import Outcome
-
-LineT = TypeVar("LineT", bound=Line)
 
 _HEADLINE = "aov"
 _OTHER_FOLDER = "choose another folder with --out"
@@ -92,8 +53,7 @@ class AppendFile:
     def append(self, lines: Iterable[Mapping[str, Any]]) -> None:
         """Write objects, one per line, and wait until they are on disk.
 
-        Raises StoreError if the disk fails, or if somebody else removed, replaced or changed the
-        file meanwhile; earlier lines stay whole.
+        Raises StoreError if the disk fails or somebody changed the file; earlier lines stay whole.
         """
         data = "".join(f"{_json_line(line)}\n" for line in lines).encode("utf-8", "replace")
         with writing(self._path, _APPENDING):
@@ -141,35 +101,31 @@ class AppendFile:
         """Raise StoreError unless the file that was written is the one at its path, and whole."""
         if self._file is None:
             return
-        opened = os.fstat(self._file.fileno())
-        try:
+        opened, is_same = os.fstat(self._file.fileno()), False
+        with contextlib.suppress(FileNotFoundError):
             is_same = os.path.samestat(opened, os.stat(self._path))
-        except FileNotFoundError:
-            is_same = False
         if not is_same or opened.st_size != self._size_bytes:
             message = "was removed, replaced or changed while the run was writing it"
-            hint = f"restore it from a copy; replies that have arrived are in {CALLS}"
+            hint = f"restore it from a copy; replies that have arrived are in {files.CALLS}"
             raise StoreError(Problem(str(self._path), message, hint=hint))
 
     def close(self) -> None:
         """Close the file, once everything that was put is written."""
         if self._file is not None:
             self._file.close()
-            self._file = None
+
+
+Answer = Reply | ModelError | None
+"""What came back for a request; None is a reply that is missing in a recording."""
 
 
 def begun(
-    sample: str, track: Track, model: str, item: Item, seed: int, answer: Reply | ModelError | None
+    sample: str, track: Track, model: str, item: Item, seed: int, answer: Answer
 ) -> dict[str, Any]:
-    """Return the fields of a record before judgement; None is a reply missing in a recording."""
+    """Return the fields of a record before its answer is judged."""
     error = None
     if isinstance(answer, ModelError):
-        kind: ErrorKind = "unavailable"
-        if isinstance(answer, RetryableError):
-            kind = "retryable"
-        elif isinstance(answer, SampleError):
-            kind = "refused" if isinstance(answer, RefusedError) else "sample"
-        known = {"kind": kind, "status": answer.status, "billed_usd": answer.billed_usd}
+        known = {"kind": answer.kind, "status": answer.status, "billed_usd": answer.billed_usd}
         error = StoredError.model_validate({**known, "message": str(answer)})
     return {
         "sample": sample,
@@ -227,11 +183,12 @@ def judge_episode(
 
     billed = [reply.billed_usd for reply in replies if reply.billed_usd is not None]
     ends = {reply.finish for reply in replies}
-    usages = [reply.usage for reply in replies]
+    usages, kinds = [reply.usage for reply in replies], type(replies[0].usage).model_fields
+    tokens = {name: total([getattr(one, name) for one in usages]) for name in kinds}
     pooled = Reply(
         text=replies[-1].text,
         finish=ends.pop() if len(ends) == 1 else "stop",
-        usage=Usage(**{n: total([getattr(one, n) for one in usages]) for n in Usage.model_fields}),
+        usage=usages[0].model_copy(update=tokens),
         cost_usd=total([reply.cost_usd for reply in replies]),
         billed_usd=plain_sum(billed) if billed else None,
         latency_s=plain_sum(reply.latency_s for reply in replies),
@@ -284,8 +241,7 @@ class Summary(NamedTuple):
         headline = next((s for s in record.scores if s.criterion == _HEADLINE), None)
         counts = None if headline is None else Counts(headline.tp, headline.fp, headline.fn)
         cached = None if record.reply is None else record.reply.cached
-        is_final, is_judged = record.is_final, record.is_judged
-        known = record.model, record.outcome, record.is_answered, is_final, is_judged
+        known = record.model, record.outcome, record.is_answered, record.is_final, record.is_judged
         return cls(*known, counts, cached, record.paid_usd)
 
 
@@ -358,26 +314,20 @@ class RunStore:
         self._folder = folder
         self.run = manifest.run
         self._prompts_known: set[str] = set()
-        self._open = ExitStack()
-        try:
-            with writing(folder, _OTHER_FOLDER):
-                check_place(folder)
-                OutFolder(folder).claim([])
-                self._open.enter_context(locked(folder))
-                self._claim(manifest)
-                records = run_records(folder, manifest, samples, whole=True)
-                self.records = self._file(records, self.progress.add)
-                calls = CallLines(folder, Validation(manifest, samples))
-                self.calls = self._file(calls, self.progress.add_call)
-                self.batches = self._file(BatchLines(folder), self.progress.batches.append)
-                # Prompts can be made again.
-                known = self._prompts_known
-                self._prompts = self._file(
-                    PromptLines(folder), lambda prompt: known.add(prompt.sha256), sync=False
-                )
-        except StoreError:
-            self.close()
-            raise
+        with writing(folder, _OTHER_FOLDER), ExitStack() as self._open:
+            check_place(folder)
+            OutFolder(folder).claim([])
+            self._open.enter_context(locked(folder))
+            self._claim(manifest)
+            records = files.run_records(folder, manifest, samples, whole=True)
+            self.records = self._file(records, self.progress.add)
+            calls = files.CallLines(folder, files.Validation(manifest, samples))
+            self.calls = self._file(calls, self.progress.add_call)
+            self.batches = self._file(files.BatchLines(folder), self.progress.batches.append)
+            # Prompts can be made again.
+            prompts, known = files.PromptLines(folder), self._prompts_known
+            self._prompts = self._file(prompts, lambda one: known.add(one.sha256), sync=False)
+            self._open = self._open.pop_all()
 
     def close(self) -> None:
         """Release the files and the lock after pending writes."""
@@ -389,10 +339,9 @@ class RunStore:
 
     async def sent(self, model: str, sample: str, key: str, most_usd: float | None) -> Call:
         """Write a call that is about to be sent. Raises StoreError if the disk fails."""
-        number = self.progress.calls
+        about = {"call": self.progress.calls, "model": model, "sample": sample, "key": key}
+        call = Call.model_validate({**about, "run": self.run, "most_usd": most_usd})
         self.progress.calls += 1
-        names = {"call": number, "model": model, "sample": sample, "key": key, "run": self.run}
-        call = Call.model_validate({**names, "most_usd": most_usd})
         await self.calls.put(call)
         return call
 
@@ -404,40 +353,32 @@ class RunStore:
 
     def keep_prompt(self, request: Request, template: str) -> SentPrompt:
         """Write a prompt unless it is stored; return its part of a record. Raises as `append`."""
-        fields = [
-            {
-                "role": message.role,
-                "parts": [
-                    {"image": part.label} if isinstance(part, Image) else well_formed(part)
-                    for part in message.parts
-                ],
-            }
-            for message in request.messages
-        ]
+
+        def stored(part: str | Image) -> object:
+            return {"image": part.label} if isinstance(part, Image) else well_formed(part)
+
+        fields = [{"role": m.role, "parts": [*map(stored, m.parts)]} for m in request.messages]
         digest = hex_digest(json.dumps(fields, sort_keys=True, separators=(",", ":")))
         if digest not in self._prompts_known:
             self._prompts_known.add(digest)
             self._prompts.append([{"sha256": digest, "messages": fields}])
-        images = tuple(
-            SentImage(**{name: getattr(image, name) for name in SentImage.model_fields})
-            for image in request.images
-        )
-        version = request.prompt_version
-        return SentPrompt(template=template, version=version, messages=digest, images=images)
+        about = {"template": template, "version": request.prompt_version, "messages": digest}
+        sent = {**about, "images": request.images}
+        return SentPrompt.model_validate(sent, from_attributes=True)
 
     def note_stopped(self, models: Mapping[str, str], run: str, asked: Collection[str]) -> None:
         """Write why the models among `asked`, or the whole run, were stopped.
 
         Earlier entries about other models are kept. Raises StoreError if the disk fails.
         """
-        earlier = read_stopped(self._folder).models
-        kept = {name: why for name, why in earlier.items() if name not in asked}
-        stopped = Stopped(models={**kept, **models}, run=run)
+        earlier = files.read_stopped(self._folder)
+        kept = {name: why for name, why in earlier.models.items() if name not in asked}
+        stopped = earlier.model_copy(update={"models": {**kept, **models}, "run": run})
         folder = OutFolder(self._folder)
         if stopped.models or stopped.run:
-            folder.write({STOPPED: json.dumps(stopped.fields(), indent=2) + "\n"})
+            folder.write({files.STOPPED: json.dumps(stopped.fields(), indent=2) + "\n"})
         else:
-            folder.remove([STOPPED])
+            folder.remove([files.STOPPED])
 
     def _file(
         self, lines: Lines[LineT], take: Callable[[LineT], object], *, sync: bool = True
@@ -458,18 +399,13 @@ class RunStore:
         """Write the manifest unless the folder has one with the same selection."""
         found = held_run(self._folder, manifest)
         if found is not None:
-            if _selection(found) == _selection(manifest):
+            old, new = ([model.name for model in one.models] for one in (found, manifest))
+            if old == new and found.suite.get("seeds") == manifest.suite.get("seeds"):
                 return
-            named = {model.name for model in manifest.models}
-            others = [m for m in (*found.models, *found.others) if m.name not in named]
+            others = [m for m in (*found.models, *found.others) if m.name not in new]
             changes = {"created": found.created, "others": tuple(others)}
             manifest = manifest.model_copy(update=changes)
-        atomic_write(self._folder / MANIFEST, dump_yaml(manifest.fields()), sync=True)
-
-
-def _selection(manifest: Manifest) -> tuple[list[str], object]:
-    """Return the models and seeds of a run, which may differ between commands."""
-    return [model.name for model in manifest.models], manifest.suite.get("seeds")
+        atomic_write(self._folder / files.MANIFEST, dump_yaml(manifest.fields()), sync=True)
 
 
 def held_run(folder: Path, manifest: Manifest) -> Manifest | None:
@@ -479,17 +415,14 @@ def held_run(folder: Path, manifest: Manifest) -> Manifest | None:
     anything else. A manifest alone does not count as a run: it is left by one that failed at once.
     """
     check_place(folder)
-    if not (folder / MANIFEST).exists():
+    if not (folder / files.MANIFEST).exists():
         return None
-    found = read_manifest(folder)
-    paid: tuple[Lines[Any], ...] = (RecordLines(folder), CallLines(folder), BatchLines(folder))
-    if all(next(iter(lines), None) is None for lines in paid):
+    found = files.read_manifest(folder)
+    if all(next(iter(kind(folder)), None) is None for kind in _PAID):
         return None
     if differ := differences(found, manifest):
-        different = f"different: {', '.join(differ)}"
-        raise StoreError(
-            Problem(str(folder), "holds another run", "", different, "", _OTHER_FOLDER)
-        )
+        changed = f"different: {', '.join(differ)}"
+        raise StoreError(Problem(str(folder), "holds another run", "", changed, "", _OTHER_FOLDER))
     here = code_versions()
     if differ := [name for name in here if found.versions.get(name) != here[name]]:
         made = ", ".join(f"{name} {found.versions.get(name)}" for name in differ)
@@ -501,7 +434,8 @@ def held_run(folder: Path, manifest: Manifest) -> Manifest | None:
 
 
 LOCK = ".lock"
-_OWN = (MANIFEST, RECORDS, CALLS, PROMPTS, BATCHES, "batches", LOCK, LIST)
+_PAID: tuple[type[Lines[Any]], ...] = (files.RecordLines, files.CallLines, files.BatchLines)
+_OWN = (files.MANIFEST, *(kind.file for kind in _PAID), files.PROMPTS, "batches", LOCK, LIST)
 _BEGUN = re.compile(rf"{re.escape(LOCK)}|{re.escape(LIST)}|\.[0-9a-f]{{32}}\.part")
 """Names of files that a run leaves if it is killed before it has a manifest."""
 
@@ -522,8 +456,7 @@ def locked(folder: Path) -> Iterator[None]:
 def check_place(folder: Path) -> None:
     """Raise StoreError unless `folder` is new, empty or a run's; nothing is written.
 
-    A folder that holds anything but no manifest belongs to somebody else. The files that a run
-    appends to must be in the folder itself, not links.
+    A folder with files but no manifest is somebody else's. A run's own files must not be links.
     """
     with writing(folder, _OTHER_FOLDER):
         try:
@@ -531,8 +464,8 @@ def check_place(folder: Path) -> None:
         except FileNotFoundError:
             return
     strangers = [name for name in names if not _BEGUN.fullmatch(name)]
-    if MANIFEST not in names and strangers:
-        message = f"is not empty and holds no run (no {MANIFEST})"
+    if files.MANIFEST not in names and strangers:
+        message = f"is not empty and holds no run (no {files.MANIFEST})"
         hint = "name a new or an empty folder with --out"
         raise StoreError(Problem(str(folder), message, found=some_of(strangers), hint=hint))
     if links := [folder / name for name in _OWN if (folder / name).is_symlink()]:
@@ -545,7 +478,7 @@ def write_run(folder: Path, manifest: Manifest, records: Iterable[Record]) -> No
     lines = (line.encode("utf-8", "replace") for line in record_lines(records))
     OutFolder(folder).claim([])
     # A kill between the two leaves a run that has to be rescored.
-    for name, data in ((RECORDS, lines), (MANIFEST, dump_yaml(manifest.fields()))):
+    for name, data in ((files.RECORDS, lines), (files.MANIFEST, dump_yaml(manifest.fields()))):
         with writing(folder / name):
             atomic_write(folder / name, data, sync=True)
 

@@ -33,8 +33,8 @@ from phyblock.results.estimates import Headline
 from phyblock.results.load import load_run
 from phyblock.results.text import number as rounded
 from phyblock.run.plan import RunPlan, make_plan
-from phyblock.run.runner import RunEvent, RunResult, RunStarted, SampleDone, Session
-from phyblock.run.store import begun, judge_reply
+from phyblock.run.runner import RunEvent, RunResult, RunStarted, Session
+from phyblock.run.store import Summary, begun, judge_reply
 from phyblock.sim.pictures import Lookout, PictureStyle, to_png
 from phyblock.text import counted, one_line
 from phyblock.tracks.base import Pick, Picking, SceneTrack, as_recorded, kind_of
@@ -202,8 +202,8 @@ class PlaySession:
                 if self.done < self._of:
                     self.welcome(person.name.removeprefix(HUMAN))
                 opened()
-            elif isinstance(event, SampleDone) and event.sample.model == person.name:
-                self.done += event.sample.is_final
+            elif isinstance(event, Summary) and event.model == person.name:
+                self.done += event.is_final
                 self._turns = 0
 
         model, loop = PersonModel(person.name, plan, self), asyncio.get_running_loop()

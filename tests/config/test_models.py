@@ -35,7 +35,7 @@ m:
     models = load(tmp_path, text)
     assert list(models) == ["gpt-4o", "on", "1e-3", "old", "m"]
     assert models["gpt-4o"] == config.ModelConfig(name="gpt-4o", id="openai/gpt-4o-2024-08-06")
-    assert models["old"].recording == tmp_path / "replies" / "old"
+    assert models["old"].replay == str(tmp_path / "replies" / "old")
     assert models["m"].addresses == ("http://h:1/v1", "http://h:2/v1")
     assert load(tmp_path, "# none yet\n") == {}
     for name in ("openai/task-abc-def", "azure/risk-big", "a/disk-12345678"):  # are no keys

@@ -137,7 +137,7 @@ def test_texts_pictures_and_orders_are_read(tmp_path, towers):
         "Ordering.json": [{**NEXT, "answer": "CABD"}],
     }.items():
         (tmp_path / name).write_text(json.dumps(content))
-    several = ("pd-001/img{}.png", "or-001/img{}.jpg")
+    several = ("pd-001/img{}.png", "or-001/img{}.png")
     for name in ("t1.png", *(one.format(i) for one in several for i in range(1, 5))):
         path = tmp_path / "images" / name
         path.parent.mkdir(parents=True, exist_ok=True)

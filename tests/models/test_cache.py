@@ -211,9 +211,9 @@ def answer(folder, key, seed=0):
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        (b'{"predict": "a"', r"007\.json:1:\d+: is not JSON"),
-        (b"\xff\xfe\x00", r"007\.json:1:1: is not JSON"),
-        (b"[" * 100_000, r"007\.json:1:1: is not JSON: is nested more than 64 levels"),
+        (b'{"predict": "a"', r"007\.json:\d+: is not JSON"),
+        (b"\xff\xfe\x00", r"007\.json: is not UTF-8"),
+        (b"[" * 100_000, r"007\.json: is nested more than 64 levels"),
         (b'{"text": ' + b"9" * 100_000 + b"}", "holds a number of 100,000 digits"),
         (b'{"error": "overloaded"}', "not a recorded reply of a known shape"),
     ],

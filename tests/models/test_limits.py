@@ -19,7 +19,7 @@ from phyblock.errors import ModelError, RetryableError, UnavailableError
 from phyblock.models.cache import ReplyCache, reply_key
 from phyblock.models.client import HttpClient
 from phyblock.models.costs import Budget, ModelBudget
-from phyblock.models.model import ChatModel, Clock, Limits, RetryPolicy, Server, Servers
+from phyblock.models.model import ChatModel, Limits, RetryPolicy, Server, Servers
 from phyblock.records.record import Reply
 from tests.models.factory import ROUTES, answers, ask, make_model, make_request, requests_of
 from tests.servers.chassis import Faults, Running
@@ -47,7 +47,7 @@ class FakeTime:
         self._numbers = itertools.count()
 
     def policy(self, **fields):
-        return RetryPolicy(clock=Clock(lambda: self.now_s, self.sleep), **fields)
+        return RetryPolicy(now=lambda: self.now_s, sleep=self.sleep, **fields)
 
     async def sleep(self, seconds):
         wake = asyncio.get_running_loop().create_future()

@@ -205,7 +205,7 @@ def test_who_is_sent_a_schema(fields, sends):
     spec = ModelConfig.model_validate(fields)
     for asked, is_sent in (("json_schema", sends), ("text", False)):
         suite = Suite(name="s", models=("m",), answer_format=asked)
-        assert to_config("m", spec, suite).sends_format is is_sent
+        assert (to_config("m", spec, suite).response_format == "always") is is_sent
 
 
 @pytest.mark.parametrize(

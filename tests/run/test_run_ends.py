@@ -24,8 +24,8 @@ from phyblock.records.files import STOPPED, read_stopped
 from phyblock.results.load import load_run
 from phyblock.run.plan import estimate
 from phyblock.run.rescore import rescore
-from phyblock.run.runner import SampleDone, Session, Stopping
-from phyblock.run.store import AppendFile
+from phyblock.run.runner import Session, Stopping
+from phyblock.run.store import AppendFile, Summary
 from phyblock.sim import dynamics
 from phyblock.tracks.full_planning import FullPlanning
 from phyblock.tracks.pictures import Workshop
@@ -171,7 +171,7 @@ def test_a_mistake_of_ours_loses_no_call_under_way(workspace, monkeypatch, place
         return judge(self, item, text)
 
     def watches_badly(event):
-        if isinstance(event, SampleDone | Stopping):
+        if isinstance(event, Summary | Stopping):
             raise ZeroDivisionError("in watch")
 
     watch = watches_badly if place == "watch" else id
