@@ -143,7 +143,7 @@ class BatchModel:
     async def ask(self, request: Request) -> Reply:
         """Return the cached reply, or the answer of the newest batch with the request.
 
-        Raises as `Model.ask`; the next command sends what failed again. A batch is never cancelled.
+        Raises as `Model.ask`; the next command repeats failed requests. A batch is never cancelled.
         """
         key = reply_key(self.config, request)
         self._asked += 1

@@ -623,7 +623,7 @@ def _parts(content: object) -> tuple[str, str]:
 
 
 def _get(raw: object, *paths: str) -> Any:
-    """Return the first value but null at these paths; 0 names a first item: `choices.0.text`."""
+    """Return the first value that is not null at a path, or None; `choices.0` is the first item."""
     for path in paths:
         value = raw
         for name in path.split("."):

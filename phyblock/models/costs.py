@@ -286,7 +286,7 @@ def estimate(config: ModelConfig, request: Request) -> Estimate:
 
 
 def most_usd(tariff: Tariff, prompt: float, reply: int, *, batched: bool = False) -> float:
-    """Return the most a call can cost [USD], by its tokens: with a cache written, and a margin."""
+    """Return the most these tokens can cost [USD]: a cache is written, the prompt has a margin."""
     price = price_at(tariff, batched=batched)
     prompt_usd = prompt * _PROMPT_MARGIN * max(price.input, price.cache_write or 0.0)
     return (prompt_usd + reply * price.output) / 1_000_000

@@ -36,7 +36,7 @@ class LocalModel:
     async def ask(self, request: Request) -> Reply | None:
         """Return the answer to the request, or None if nothing was recorded.
 
-        Raises the recorded error, DataError for a broken one, SpecError for a track without a rule.
+        Raises the recorded error, DataError for a bad file, SpecError for a track without a rule.
         """
         reply = self.answer(request)
         return None if reply is None else reply.model_copy(update=_FREE)

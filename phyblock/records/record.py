@@ -372,10 +372,9 @@ class Record(Line):
         return None if plan is None else " ".join(map(str, plan))
 
     def course(self, matcher: str) -> Course | None:
-        """Return the steps of an assembly by a matcher, or None if it was not scored by it."""
-        assemblies = [score for score in self.scores if score.why is not None]
-        first = next(iter(assemblies), None)
-        score = next((one for one in assemblies if one.matcher == matcher), first)
+        """Return the steps of an assembly by a matcher, else by the first that scored it."""
+        assemblies = (score for score in self.scores if score.why is not None)
+        score = min(assemblies, key=lambda one: one.matcher != matcher, default=None)
         if score is None:
             return None
         names = (self.parsed_text or "").split()
