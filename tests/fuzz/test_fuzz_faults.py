@@ -78,7 +78,6 @@ def run(workspace, *args):
 
 
 def holds(broken):
-    """Fail with the laws that were broken."""
     assert not (told := [f"{one.name}: {one.detail}" for one in broken]), "\n".join(told[:20])
 
 

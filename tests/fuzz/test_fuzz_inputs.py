@@ -73,7 +73,6 @@ class Case:
     lasting: tuple[str, ...] = ()
 
     def tried_in(self, here):
-        """The end of the command in a workspace, and the laws that it breaks."""
         (here.root / "tmp").mkdir()
         here.env["TMPDIR"] = str(here.root / "tmp")
         for name, content in self.files.items():
@@ -288,7 +287,6 @@ def _with_bad_line(path):
 
 @pytest.mark.parametrize("kind", [*KINDS, "run folders"])
 def test_bad_input(kind, request, tmp_path, tallies):
-    """Draw cases, try each, and fail with all that was broken."""
     if kind in KINDS:
         template, cases = request.getfixturevalue("sound"), KINDS[kind]
     else:

@@ -55,19 +55,16 @@ def disk(tmp_path):
 
 @contextlib.contextmanager
 def serving(route, faults=None, kind=None):
-    """A server of batches, and a model there."""
     with Running((kind or SERVERS[route])(batch=faults or BatchFaults())) as running:
         yield running.server, factory.ROUTES[route].config(running.url, batch=True, price=PRICE)
 
 
 def served(route, disk, requests, faults=None, **options):
-    """A server of batches, and what a command comes to there."""
     with serving(route, faults) as (server, config):
         return server, run_command(config, disk, requests, **options)
 
 
 def all_once(server, ended):
-    """Every request has its reply, and was asked once."""
     assert {type(one) for one in ended} == {Reply}, ended
     assert (len(server.asked), set(server.asked.values())) == (len(ended), {1})
 

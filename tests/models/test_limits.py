@@ -76,7 +76,6 @@ def servers_of(count, policy, client=None):
 
 
 def limits_of(most, overall, time=None, **fields):
-    """The limits of a model at one server."""
     config = ROUTES["direct"].config("http://replica:1", max_concurrency=most, **fields)
     return Limits(config, overall, servers_of(1, (time or FakeTime()).policy()))
 

@@ -72,7 +72,6 @@ class Wire:
         return ask(model, *(requests or [make_request("001", 1)])), server, events
 
     def arrived(self, route, request, **fields):
-        """Return a request as it arrived at the server."""
         (answer,), server, _ = self.ask(route, request, **fields)
         assert isinstance(answer, Reply), answer
         return server.seen[0]

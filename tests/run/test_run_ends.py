@@ -41,7 +41,6 @@ AT_ONCE = 4
 
 
 def interrupted(process):
-    """The output of a run that ended by a signal."""
     out, err = process.communicate()
     assert (process.returncode, err) == (130, "")
     return out
@@ -382,7 +381,6 @@ def test_kills_of_the_process_lose_nothing_and_ask_nothing_twice(workspace):
 
 
 def kill_at(number, workspace, server):
-    """Kill a run at a moment of its server."""
     reached, is_dead = threading.Event(), threading.Event()
     count = itertools.count()
 
@@ -414,8 +412,6 @@ def test_calls_in_batches_are_estimated_at_half_the_price(workspace):
 
 
 class BySeed(OpenAIChat):
-    """Ends each request as its seed says."""
-
     def __init__(self, endings, **more):
         super().__init__()
         self._endings, self._more = endings, more

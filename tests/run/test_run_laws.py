@@ -43,7 +43,6 @@ calls = st.tuples(samples, st.sampled_from("ab"), cents, st.booleans(), st.none(
 
 @pytest.fixture(scope="module")
 def finished(new_workspace):
-    """A run of a model that answers, and of two baselines."""
     made = new_workspace()
     with made.served(OpenAIChat(), models=["alpha", "random", "oracle"], seeds=[0, 1, 2]):
         made.completed()
@@ -56,7 +55,6 @@ def copy(finished, tmp_path):
 
 
 def scores(records):
-    """Return what was read in each reply and what it is worth, by sample."""
     return {r["sample"]: {k: r[k] for k in ("outcome", "parse", "scores")} for r in records}
 
 

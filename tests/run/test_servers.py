@@ -67,7 +67,6 @@ PNG_HEAD = base64.b64encode(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR")[:20]
 
 
 def told(seen):
-    """A plan, and the key."""
     return f"{seen.reply_text}\nYour key is {seen.key}."
 
 

@@ -45,7 +45,6 @@ EARLIER = 5
 
 
 def schema_of(seen):
-    """The schema that a prompt ends with."""
     return json.loads(str(seen.parts[-1]).splitlines()[-1])
 
 
@@ -109,7 +108,6 @@ def test_all_tracks_ask_and_read_by_the_schema(inside):
 
 
 def a_cube(seen):
-    """The letter of the cube wherever it stands; else A."""
     found = re.search(r"^([A-D])\. cube$", str(seen.parts[-1]), re.MULTILINE)
     return f"It looks like a cube.\n\nAnswer: {found[1] if found else 'A'}"
 
