@@ -25,9 +25,8 @@ class Problem:
     hint: str = ""
 
     def __str__(self) -> str:
-        where, field = _plain(self.where), _plain(self.field)
-        head = f"{where}: {field}: " if field else f"{where}: "
-        lines = [head + _plain(self.message)]
+        parts = (self.where, self.field, self.message) if self.field else (self.where, self.message)
+        lines = [": ".join(map(_plain, parts))]
         details = (("found", self.found), ("allowed", self.allowed), ("hint", self.hint))
         lines += [f"    {name}: {_plain(text)}" for name, text in details if text]
         return "\n".join(lines)

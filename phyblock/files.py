@@ -196,8 +196,7 @@ def writing(path: Path, hint: str = "") -> Iterator[None]:
 
 def check_free(paths: Iterable[Path], hint: str) -> None:
     """Raise StoreError naming all of `paths` that exist, broken links included."""
-    taken = [path for path in paths if os.path.lexists(path)]
-    if taken:
+    if taken := [path for path in paths if os.path.lexists(path)]:
         raise StoreError([Problem(str(path), "is already there", hint=hint) for path in taken])
 
 
@@ -408,16 +407,14 @@ class OutFolder:
                 raise StoreError(Problem(str(path), str(error), hint=_MOVE)) from error
 
 
-_PACKAGE = Path(__file__).parent
-
-
 def bundled(*parts: str) -> Path:
     """Return the path of a bundled file or folder, in `benchmarks/`, `prompts/` or `models.yaml`.
 
     They are in the package in an installed wheel, and beside it in a checkout.
     """
-    inside = _PACKAGE / "bundled"
-    return (inside if inside.is_dir() else _PACKAGE.parent).joinpath(*parts)
+    package = Path(__file__).parent
+    inside = package / "bundled"
+    return (inside if inside.is_dir() else package.parent).joinpath(*parts)
 
 
 def bundled_sets(file: str) -> list[str]:
@@ -427,8 +424,7 @@ def bundled_sets(file: str) -> list[str]:
 
 def cache_dir() -> Path:
     """Return the user's cache folder: `$PHYBLOCK_CACHE`, else the platform's place for caches."""
-    named = os.environ.get("PHYBLOCK_CACHE")
-    if named:
+    if named := os.environ.get("PHYBLOCK_CACHE"):
         return Path(named).expanduser()
     return Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "phyblock"
 

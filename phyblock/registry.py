@@ -13,13 +13,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from phyblock.tracks.base import Track
 
-_MODULES = (
-    "phyblock.tracks.full_planning",
-    "phyblock.tracks.step_planning",
-    "phyblock.tracks.questions",
-    "phyblock.tracks.pose_planning",
-)
-"""Modules that hold a `TRACK`, in the order in which tracks are listed."""
+_MODULES = ("full_planning", "step_planning", "questions", "pose_planning")
+"""Modules of `tracks` that hold a `TRACK`, in the order in which tracks are listed."""
 
 PLUGINS: list[str] = []
 """Modules that every worker process imports first, so that their additions are known there too."""
@@ -31,7 +26,7 @@ _baselines: dict[str, dict[str, Callable[..., str]]] = {}
 
 @functools.cache
 def _built_in() -> Mapping[str, type[Track]]:
-    tracks = [importlib.import_module(module).TRACK for module in _MODULES]
+    tracks = [importlib.import_module(f"phyblock.tracks.{name}").TRACK for name in _MODULES]
     return {kind.name: kind for kind in tracks}
 
 

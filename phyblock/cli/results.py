@@ -44,8 +44,7 @@ def report(run: Path, prints: bool, names: tuple[str, ...], form: str, data: Pat
 
     loaded = load_run(run)
     _check_names(run, names, table_names(loaded), "table")
-    tables = make_tables(loaded, names or table_names(loaded))
-    if not tables:
+    if not (tables := make_tables(loaded, names or table_names(loaded))):
         console.print("The run has no numbers for this table.")
     for name, table in tables.items():
         if form == "text":

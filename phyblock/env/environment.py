@@ -144,9 +144,7 @@ class _BlockPlay:
 
 
 class _PosePlay:
-    """Assembly with poses, after `begin`: blocks are released at the positions of actions, with the
-    tolerances of `EXECUTION_LIMITS`; a goal block is reached by one of its kind within `_NEAR`.
-    """
+    """Assembly with poses, after `begin`; blocks of its kind within `_NEAR` reach a goal block."""
 
     def __init__(self, style: PictureStyle, *, is_strict: bool) -> None:
         self._style, self._is_strict = style, is_strict

@@ -45,8 +45,7 @@ def choice_form(options: Sequence[str], is_ordering: bool) -> AnswerForm[str]:
 
 def parse_answer(text: str, options: Sequence[str], is_ordering: bool) -> ParsedAnswer:
     """Parse the answer from a reply to a question with these `options`, the first one as A."""
-    answer = answer_of(text)
-    if not answer:
+    if not (answer := answer_of(text)):
         return ParsedAnswer(None, None, "empty" if answer == "" else "thoughts_only")
     if "{" in answer and (stated := choice_form(options, is_ordering).read(answer)):
         return ParsedAnswer(stated, "json")
@@ -134,8 +133,7 @@ def _order(plain: str, options: Sequence[str]) -> tuple[str, str | None]:
     pattern = re.compile(rf"(?<![\w']){_BETWEEN.join([one] * len(letters))}(?![\w'])")
     for rule, texts in (("answer_line", _ANSWER.findall(plain)), ("order", [plain])):
         found = ["".join(groups) for text in texts for groups in pattern.findall(text)]
-        whole = [order for order in found if set(order) == set(letters)]
-        if whole:
+        if whole := [order for order in found if set(order) == set(letters)]:
             return rule, whole[-1]
     return "order", None
 
@@ -188,8 +186,7 @@ def move_form(n_candidates: int, *, reasons: bool = True) -> AnswerForm[ParsedMo
 
 def parse_move(text: str) -> ParsedMove:
     """Parse the only operation in a reply."""
-    answer = answer_of(text)
-    if answer is None:
+    if (answer := answer_of(text)) is None:
         return ParsedMove(problem="thoughts_only")
     if stated := move_form(0).read(answer):
         return stated

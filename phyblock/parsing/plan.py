@@ -47,8 +47,7 @@ def parse_plan(text: str, n_candidates: int, parser: PlanParser = "steps") -> Pa
         numbers = [int(match[1]) for match in _OFFICIAL.finditer(text)]
         rule, is_cut = "block_with_index", False
     else:
-        answer = answer_of(text)
-        if answer is None:
+        if (answer := answer_of(text)) is None:
             return ParsedPlan(Plan(), None, problem="thoughts_only")
         rule, numbers, is_cut = _steps(answer, n_candidates)
     if not numbers:
@@ -146,16 +145,14 @@ class Item:
     @cached_property
     def blocks(self) -> list[int]:
         """The numbers of the blocks that it places, in order."""
-        found = _blocks(self.text)
-        if not found:
+        if not (found := _blocks(self.text)):
             below = _ACTS.match if _WORD.search(self.text) else _WORD.search
             found = [number for line in filter(below, self.more) for number in _blocks(line)]
         return found * self.span if len(found) == 1 else found
 
 
 def _blocks(text: str) -> list[int]:
-    first = _NAMED.search(text)
-    if first is None:
+    if (first := _NAMED.search(text)) is None:
         bare = _BARE.match(text)
         return [int(bare[1] or bare[2])] if bare else []
     found, end = [int(first[1])], first.end()
@@ -391,8 +388,7 @@ def parse_poses(text: str, n_candidates: int) -> ParsedPoses:
     It is JSON of the requested form, else the last list of step lines, items or table rows, each
     with a block and coordinates. It is read whole or not at all: without a step it is another plan.
     """
-    answer = answer_of(text)
-    if not answer:
+    if not (answer := answer_of(text)):
         return ParsedPoses((), None, "empty" if answer == "" else "thoughts_only")
     rule, steps = "json", pose_form(n_candidates).read(answer) or []
     if not steps:

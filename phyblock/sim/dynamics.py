@@ -219,8 +219,7 @@ def _settled(blocks: tuple[Block, ...], trial: Trial, engine: PhysicsEngine) -> 
         with open_world(physics, engine) as world:
             world.place(*blocks)
             wait(world, trial.duration_s)
-            moved = movement(blocks, world.poses(), trial).fallen
-            if moved:
+            if moved := movement(blocks, world.poses(), trial).fallen:
                 wait(world, _COLLAPSE_S)
                 poses = world.poses()
                 moved += movement(blocks, poses, trial).fallen
@@ -344,8 +343,7 @@ class Executor:
             return ExecutedStep("no_block")
         block = replace(block, order=self._steps)
         overlap_cm, stand_cm, stand_deg = EXECUTION_LIMITS.values()
-        below_cm = -float(bounds_m(block)[0, 2]) * _CM
-        if below_cm > overlap_cm:
+        if (below_cm := -float(bounds_m(block)[0, 2]) * _CM) > overlap_cm:
             return ExecutedStep("under_floor", overlap_cm=round(below_cm, _DIGITS))
         others = self.blocks
         most_m = overlap_cm / _CM

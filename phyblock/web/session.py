@@ -437,8 +437,7 @@ def went(record: Record, matcher: str) -> dict[str, Any]:
     """Return the answer, step by step with the reason for wrong ones, or with the right answer."""
     if record.is_correct is not None:
         return {"given": record.parsed_text, "right": record.target, "correct": record.is_correct}
-    course = record.course(matcher)
-    if course is None:
+    if (course := record.course(matcher)) is None:
         return {}
     steps = [{"name": name, "why": why} for name, why in course.steps]
     return {"steps": steps, "missing": course.missing}
