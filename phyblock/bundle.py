@@ -129,7 +129,7 @@ def opened_bundle(path: Path, data: Sequence[Path] = ()) -> Iterator[Verified]:
                     seen.add(record.sample)
             expected = design_of(here, str(path)).all_samples
             physics = ", ".join(kind.title for kind in simulating(here.suite))
-            fell = [f"{physics}: what fell, which is taken from the records."] if physics else []
+            fell = [f"{physics}: what fell and where it came to rest."] if physics else []
             yield Verified(made_by, here, folder, count, expected, (*fell, *_NEVER_VERIFIED))
         except InputError as error:
             shown = [

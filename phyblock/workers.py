@@ -86,9 +86,11 @@ class Workers:
                     yield from started.popleft().result()
             while started:
                 yield from started.popleft().result()
-        finally:
+        except (Exception, GeneratorExit):
+            # After Ctrl-C, a pool is killed, and fails with an error of its own for cancelled jobs.
             for waiting in started:
                 waiting.cancel()
+            raise
 
 
 class Shards:

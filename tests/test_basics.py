@@ -1,7 +1,9 @@
 """Root modules: texts that steer nothing, sums that are alike, worker processes."""
 
 import builtins
+import csv
 import functools
+import io
 import math
 import operator
 import os
@@ -13,12 +15,14 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from types import SimpleNamespace
 
+import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from phyblock.errors import ModelError, PhyblockError, StoreError
 from phyblock.making.questions.guesses import text_features
+from phyblock.results.text import to_csv
 from phyblock.scoring.pose import PoseFit, overlap_volume
 from phyblock.text import csv_cell, one_line, plain_sum
 from phyblock.tracks.pose_planning import FITS
@@ -38,6 +42,13 @@ def test_no_cell_begins_a_formula_and_what_it_held_can_be_had_back(text):
     # Taken back as docs/results.md says.
     is_marked = cell.startswith("'") and cell.lstrip("'").startswith(STARTS)
     assert (cell[1:] if is_marked else cell) == text
+
+
+@given(st.lists(risky, min_size=1))
+def test_a_table_is_read_back_row_by_row(texts):
+    table = to_csv(pd.DataFrame({"text": texts, "n": 1}))
+    _, *rows = csv.reader(io.StringIO(table, newline=""))
+    assert rows == [[csv_cell(text), "1"] for text in texts]
 
 
 @given(st.integers() | st.floats() | st.none())
@@ -227,7 +238,7 @@ def stay(n):
 if __name__ == "__main__":
     try:
         with open_workers(2) as workers:
-            list(workers.map(stay, range(2)))
+            list(workers.map(stay, range(99)))
     except KeyboardInterrupt:
         sys.exit(130)
 """

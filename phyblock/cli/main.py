@@ -127,9 +127,11 @@ def main() -> None:
         sys.exit(0)
     except click.ClickException as error:
         error.show()
-        if "unexpected extra argument" in error.format_message():
+        context = getattr(error, "ctx", None)
+        takes_set = context and any(param.name == "sets" for param in context.command.params)
+        if takes_set and "unexpected extra argument" in error.format_message():
             click.echo(f"Hint: {QUOTE_HINT}", err=True)
-        elif isinstance(error, click.NoSuchOption):
+        elif takes_set and isinstance(error, click.NoSuchOption):
             from phyblock.config.suite import suite_model
 
             name = error.option_name.lstrip("-").replace("-", "_")

@@ -165,7 +165,7 @@ def _conclude(console: Console, folder: Path, result: RunResult, view: ProgressV
     )
     cause = result.stop.cause if result.stop else None
     if others := [model.name for model in read_manifest(folder).others]:
-        also = f"The run also holds {some_of(others)}: name them with --models to see them again."
+        also = f"Kept, but not shown: records of {some_of(others)}. Name them with --models."
         console.print(also, style="dim")
     if result.left:
         ui.print_again(console, "raise limits.max_cost_usd and run" if cause == "cost" else "run")

@@ -48,7 +48,9 @@ def export(
     from phyblock.results.tables import export_frame, write_csv
 
     named = (run is not None) + scenes + (questions is not None)
-    if named != (form != "lmms-eval"):
+    if form == "lmms-eval" and named:
+        raise click.UsageError("lmms-eval gets tasks: name no run, --scenes or --questions.")
+    if form != "lmms-eval" and named != 1:
         raise click.UsageError("Name the folder of a run, --scenes or --questions.")
     if run is not None and limit is not None:
         raise click.UsageError("--limit is for scenes, questions and tasks.")

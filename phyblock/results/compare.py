@@ -291,8 +291,9 @@ def compare(
         pairs = _pairs_of_runs(run, other, models)
     shared = [name for name in kinds() if all(name in one.design.suite.tracks for one in runs)]
     if not shared or (track and track not in shared):
-        where, allowed = ", ".join(str(one.path) for one in runs), ", ".join(shared) or "none"
-        raise SpecError(Problem(where, "has no such track to compare", "track", track, allowed))
+        where, allowed = ", ".join(str(one.path) for one in runs), ", ".join(shared)
+        message = "has no such track to compare" if shared else "have no track in common"
+        raise SpecError(Problem(where, message, "track", track, allowed))
     what = comparable(run, track or shared[0], measure)
     parts = what.parts
     if other is not None:
@@ -368,7 +369,7 @@ def _verdict(row: Mapping[Any, Any], measure: Measure, n_tests: int) -> str:
     if np.isnan(row["difference"]):
         return "nothing to compare"
     if np.isnan(row["p_holm"]):
-        return "cannot tell: a single base scene"
+        return "too few base scenes to tell"
     if row["p_holm"] >= _LEVEL:
         # With so few base scenes, no corrected p value can be below the level.
         too_few = n_tests * statistics.least_p(row["n_clusters"]) >= _LEVEL

@@ -291,7 +291,9 @@ def checked_models(run: Run, models: Sequence[str]) -> Sequence[str]:
     known = run.design.model_names
     if unknown := [name for name in models if name not in known]:
         where, found, allowed = str(run.path), ", ".join(unknown), ", ".join(known)
-        raise SpecError(Problem(where, "has no such model", "--models", found, allowed))
+        is_kept = any(other.name in unknown for other in run.manifest.others)
+        hint = "the run holds it, but was last continued without it: name it there" * is_kept
+        raise SpecError(Problem(where, "has no such model", "--models", found, allowed, hint))
     if twice := [name for name in dict.fromkeys(models) if models.count(name) > 1]:
         problem = Problem(str(run.path), "is given a model twice", "--models", ", ".join(twice))
         raise SpecError(problem)

@@ -168,7 +168,7 @@ def _conflicts(
         if is_replay and (varied := ", ".join(suite.vary.factors)):
             yield Problem(where, "is a recording, which cannot be varied", "vary", varied)
             continue
-        if model.replay is not None:
+        if model.replay is not None and os.path.isdir(model.replay):
             # Raw replies were made as in the paper.
             made = {"candidates.order": "file", "answer_format": "text"}
             if (path := Path(model.replay, files.MANIFEST)).is_file():

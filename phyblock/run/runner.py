@@ -294,10 +294,12 @@ class Session:
             try:
                 item = sample.track.shown(sample.item, sample.seed)
                 record = await (self._play if sample.track.plays else self._ask)(sample, item)
-                await self._store.records.put(record)
                 summary = Summary.of(record)
+                _, is_cancelled = await to_its_end(self._store.records.put(record))
                 self.result.add(summary)
                 self.watch(summary)
+                if is_cancelled:
+                    return
             except errors.UnavailableError as error:
                 queue.clear()
                 if model not in self.result.stopped:

@@ -145,6 +145,19 @@ class PoseRecord(Record):
     pose: PoseOutcome | None = None
     """Its score."""
 
+    def executed(self, scene: Scene, steps: Sequence[Mapping[str, Any]]) -> PoseOutcome | None:
+        """Return its result if it can be that of executing these steps, else None."""
+        kept, given = self.pose, () if self.parse is None else self.parse.steps
+        if kept is None or kept.limits != _LIMITS or [step.fields() for step in given] != steps:
+            return None
+        is_possible = (
+            len(kept.steps) == len(steps)
+            and 0 <= kept.iou <= 1
+            and 0 <= kept.reached <= len(scene)
+            and (kept.reached == len(scene) or not kept.completed)
+        )
+        return kept if is_possible else None
+
     def course(self, matcher: str) -> Course | None:
         """Return the error of each step, and how many goal blocks were not reached."""
         if self.pose is None or self.parse is None:
@@ -171,6 +184,7 @@ class PoseRecord(Record):
         return tuple(world.values())
 
 
+_EXECUTED = {"steps", "limits", "reached", "iou", "completed", "engine"}
 _ENDED = ("end", "moved_cm", "overlap_cm", "knocked")
 _scorer = functools.lru_cache(maxsize=32)(PoseScorer)
 
@@ -193,11 +207,9 @@ def judge_poses(
     poses = of_poses.score(numbers, blocks)
     fits = poses[0].fits
     steps = [{"block": step.candidate, "center_cm": step.center_cm} for step in given]
-    done: Mapping[str, Any] = {}
-    if isinstance(earlier, PoseRecord) and earlier.pose is not None and earlier.parse is not None:
-        known = [step.fields() for step in earlier.parse.steps]
-        done = earlier.pose.fields() if known == steps else {}
-    if done.get("limits") != _LIMITS or len(done["steps"]) != len(steps):
+    if isinstance(earlier, PoseRecord) and (known := earlier.executed(item.scene, steps)):
+        done = known.model_dump(include=_EXECUTED, exclude_unset=True)
+    else:
         done = _executed(item.scene, blocks)
     errors = pose.pose_errors(of_poses.goal, numbers, fits, [step["end"] for step in done["steps"]])
     # The plan without its poses, under every setting and matcher.

@@ -158,7 +158,7 @@ def test_more_models_and_seeds_go_on_in_the_folder_and_fewer_select_from_it(work
     fewer = ("--set", "seeds=[0,1]", "--set", "settings=[B,A]", "--set", "name=x")
     said = workspace.completed(*fewer).out
     assert "All 10 samples are done" in said
-    assert "also holds oracle: name them with --models" in said
+    assert "Kept, but not shown: records of oracle. Name them with --models." in said
     for words in (["run", "suite.yaml", "--out", "out", "--no-report"], ["score", "out"]):
         workspace.does(*words)
         assert before.items() <= workspace.tables().items()

@@ -102,8 +102,11 @@ def test_a_reply_is_read_scored_and_carried_out(track, task, text, right, ends, 
     fields = begun("s", track, "m", task, 0, None) | track.about(task)
     record = judged(track, task, fields, found)
     assert known_records().validate_json(record.as_json()) == record
-    again = asyncio.run(track.judge_apart(task, text, record))
-    assert judged(track, task, fields, again) == record
+    impossible = {"iou": 1e300}, {"reached": 99}, {"completed": True, "reached": 0}, {"x": "<b>"}
+    changed = [record.pose.model_copy(update=one) for one in impossible]
+    for kept in (record, *(record.model_copy(update={"pose": one}) for one in changed)):
+        again = asyncio.run(track.judge_apart(task, text, kept))
+        assert judged(track, task, fields, again) == record
 
 
 @pytest.mark.parametrize("baseline", ["oracle-noise-1cm", "stack", "oracle-2d"])

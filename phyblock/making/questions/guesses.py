@@ -154,7 +154,7 @@ def text_features(text: str, options: Sequence[str]) -> list[Mapping[str, float]
         rows.append(
             {
                 **{f"option {word}": 1.0 for word in [*mine, *pairs, whole]},
-                **{f"asked {one} option {whole}": _CROSSED for one in asked},
+                **{f"asked {one} option {whole}": _CROSSED for one in sorted(asked)},
                 "likeness": shared[i],
                 "most alike": float(shared[i] == max(shared) > min(shared)),
                 "least alike": float(shared[i] == min(shared) < max(shared)),
