@@ -29,7 +29,7 @@ from phyblock.registry import known_tracks
 FORMAT = 1
 """Version of run folders; additional fields do not change it."""
 MANIFEST = "run.yaml"
-_HINT = "run.yaml is written by `phyblock run` and never edited: restore it from a copy"
+_HINT = "restore the file from a copy; a run with a plugin needs it again: phyblock --plugin MODULE"
 _DIGITS = 16
 _LARGEST_BYTES = 2 * 1024 * 1024
 """Far above the manifest of the largest allowed suite."""
@@ -316,7 +316,10 @@ class RecordLines(Lines[Record]):
     file = RECORDS
     kind = Record
     noun = "record"
-    hint = "restore the file from a copy, or remove this line: its sample is then run again"
+    hint = (
+        "restore the file from a copy, load the plugin of its track (phyblock --plugin MODULE), or "
+        "remove this line: its sample is then run again"
+    )
 
     def adapter(self) -> TypeAdapter[Any]:
         """Return the type adapter of a record, by the model of its track."""

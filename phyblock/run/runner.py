@@ -59,7 +59,9 @@ class Stopping:
     def text(self) -> str:
         """Message to the person who stopped it: what it waits for, and how to cancel that."""
         if not self.in_flight:
-            return f"Stopping: {self.reason}."
+            return (
+                f"Stopping: {self.reason}; what is in progress ends first (Ctrl-C again: at once)."
+            )
         calls = f"{counted(self.in_flight, 'call')} in progress"
         return f"Stopping: {self.reason}; waiting for {calls} (Ctrl-C again to give them up)."
 

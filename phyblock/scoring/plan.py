@@ -421,15 +421,20 @@ class AssemblyScorer:
         self._scene = scene
         self._goals = {setting: Goal(scene, candidates, setting) for setting in settings}
         # Models and seeds often give the same plan.
-        self.score = functools.lru_cache(_PLANS_KEPT)(self._score)
+        self._known = functools.lru_cache(_PLANS_KEPT)(self._score)
 
-    def _score(
-        self, plan: Plan, matchers: tuple[Matcher, ...], level1: Level1Criterion | None
+    def score(
+        self, plan: Plan, matchers: Sequence[Matcher], level1: Level1Criterion | None
     ) -> tuple[dict[str, Any], ...]:
         """Return the fields of a record's scores, by setting, then matcher.
 
         Raises KeyError for an unknown candidate.
         """
+        return self._known(plan, tuple(matchers), level1)
+
+    def _score(
+        self, plan: Plan, matchers: tuple[Matcher, ...], level1: Level1Criterion | None
+    ) -> tuple[dict[str, Any], ...]:
         scores: list[dict[str, Any]] = []
         for setting, goal in self._goals.items():
             matches = [match_plan(goal, plan, matcher) for matcher in matchers]
