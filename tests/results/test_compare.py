@@ -118,7 +118,7 @@ def test_two_runs_are_compared_by_the_models_they_share_or_by_two_named():
         (one_seed(matchers=["paper"]), r"scoring\.matchers: cannot be compared with run"),
         (one_seed(level1="membership"), r"scoring\.level1: cannot be compared with run"),
         (one_seed(models=["beta"]), "no model in common"),
-        (one_seed(suite={"tracks": ["vqa"]}), "no such track to compare"),
+        (one_seed(suite={"tracks": ["vqa"]}), "no track in common"),
     ],
 )
 def test_runs_that_cannot_be_compared_are_refused(other, said):
