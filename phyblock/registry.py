@@ -6,15 +6,18 @@ Lower layers look up here what tracks add, without importing them: modules load 
 from __future__ import annotations
 
 import functools
-import importlib
+import pkgutil
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from phyblock.tracks.base import Track
 
-_MODULES = ("full_planning", "step_planning", "questions", "pose_planning")
-"""Modules of `tracks` that hold a `TRACK`, in the order in which tracks are listed."""
+_TRACKS = (
+    *("full_planning:FullPlanning", "step_planning:StepPlanning"),
+    *("questions:Vqa", "pose_planning:PosePlanning"),
+)
+"""Modules of `tracks` and their classes, in the order in which tracks are listed."""
 
 PLUGINS: list[str] = []
 """Modules that every worker process imports first, so that their additions are known there too."""
@@ -26,7 +29,7 @@ _baselines: dict[str, dict[str, Callable[..., str]]] = {}
 
 @functools.cache
 def _built_in() -> Mapping[str, type[Track]]:
-    tracks = [importlib.import_module(f"phyblock.tracks.{name}").TRACK for name in _MODULES]
+    tracks = [pkgutil.resolve_name(f"phyblock.tracks.{name}") for name in _TRACKS]
     return {kind.name: kind for kind in tracks}
 
 

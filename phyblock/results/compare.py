@@ -64,9 +64,8 @@ def check_pair(run: Run, first: Run, cells: Sequence[str], track: str, measure: 
             need(field, ", ".join(known), name, "phyblock score reads stored replies again")
     for path in measure.counted.same:
         need(path, _field(run, path), _field(first, path), "run the older one again")
-    blocks = [
-        one.records.drop_duplicates("scene").set_index("scene")["n_blocks"] for one in (first, run)
-    ]
+    scenes = [one.records.drop_duplicates("scene") for one in (first, run)]
+    blocks = [one.set_index("scene")["n_blocks"] for one in scenes]
     both = pd.concat(blocks, axis=1, join="inner", keys=["first", "other"])
     for row in both[both["first"] != both["other"]].itertuples():
         need(f"blocks of scene {row.Index}", row.other, row.first)
@@ -88,8 +87,7 @@ class Part(NamedTuple):
     criterion: str = ""
 
 
-@dataclass(frozen=True, eq=False)
-class Side:
+class Side(NamedTuple):
     """A model of a run, with its name in a comparison."""
 
     label: str
@@ -146,11 +144,9 @@ class Comparable:
         """
         runs = {id(side.run): side.run for side in sides}
         wanted = dict(zip(SCORED_BY, (design.setting, design.matcher, part.criterion), strict=True))
-        tables, counts = [], []
+        tables, counts, cells = [], [], self.cells.values()
         for name, run in runs.items():
-            rows = estimates.counted_rows(
-                run, self.track, self.measure.counted, self.cells.values(), design
-            )
+            rows = estimates.counted_rows(run, self.track, self.measure.counted, cells, design)
             pooled = estimates.pooled_in(self.cells[part.cell], self.cells)
             masks = np.stack([rows.cells[name] for name in pooled])
             used = masks.any(axis=0)
@@ -171,9 +167,7 @@ class Comparable:
         return Samples(keys, table["cell"].to_numpy(np.intp)[first], every)
 
     def values(self, run: Run, part: Part, design: Design) -> Iterator[tuple[str, pd.Series]]:
-        """Yield each model with the values of its samples in the measure's unit, by scene, item,
-        seed and variant, without samples that have no value.
-        """
+        """Yield each model with its samples' values in the measure's unit, by `_KEYS`, no NaN."""
         sides = sides_of(run)
         found = self.samples(sides, part, design).values(self.measure)
         for side, worth in zip(sides, found, strict=True):
@@ -433,7 +427,6 @@ def compare_view(found: Comparison) -> TextTable:
     columns = [Column.text("a", "A", once=True), Column.text("b", "B", once=True)]
     if found.table["part"].nunique() > 1:
         columns.append(Column("Part", "", True, lambda row: level_name(row["part"])))
-
     columns += [
         *(Column.value("value_a", "A", group), Column.value("value_b", "B", group)),
         Column.value("difference", "A - B", group, signed=True),

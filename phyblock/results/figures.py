@@ -308,10 +308,9 @@ def write_paper_figures(
 ) -> tuple[Path, ...]:
     """Draw figures for a paper into `out`, else into `paper/` of the run's folder.
 
-    Each is NAME.pdf, NAME.svg and NAME.png, with its caption NAME.txt. Without names, all figures
-    that have numbers are drawn. The same records give the same bytes. Raises StoreError for a
-    folder that cannot be written and, before anything is drawn,
-    naming every file that would be overwritten and that phyblock did not write.
+    Each is NAME.pdf, NAME.svg and NAME.png, with its caption NAME.txt; without names, all that have
+    numbers. The same records give the same bytes. Raises StoreError for a folder that cannot be
+    written and, before anything is drawn, naming every file of others that would be overwritten.
     """
     makers = figures_of(run)
     wanted = list(names) or list(makers)

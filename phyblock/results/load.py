@@ -174,10 +174,6 @@ def design_of(manifest: Manifest, where: str = files.MANIFEST) -> Design:
     return Design(files.suite_of(manifest, where), manifest.models, manifest.items, manifest.scenes)
 
 
-_SHOWN_AS = ("circular", "blind")
-"""Options of a track's section of a suite that captions name."""
-
-
 @dataclass(frozen=True, eq=False)
 class Run:
     """A loaded run folder: `manifest` is its `run.yaml`, `design` the plan in it.
@@ -262,11 +258,9 @@ class Run:
         """Return the unusual features of a track's presentation, as words for captions."""
         suite, kind = self.design.suite, kind_of(track)
         held = self.manifest.suite.get(kind.section) or {}
-        is_shuffled = "candidate_order" in kind.varies and suite.candidates.order == "shuffled"
-        words = ["candidates shuffled"] * (
-            is_shuffled and "candidate_order" not in suite.vary.factors
-        )
-        words += [name for name in _SHOWN_AS if held.get(name)]
+        is_one_order = "candidate_order" in {*kind.varies} - {*suite.vary.factors}
+        words = ["candidates shuffled"] * (is_one_order and suite.candidates.order == "shuffled")
+        words += [name for name in ("circular", "blind") if held.get(name)]
         words += ["answers asked for as JSON"] * (suite.answer_format == "json_schema")
         n = len(suite.vary.variants)
         return (*words, *([f"asked in {n:,} ways"] if n > 1 else []))

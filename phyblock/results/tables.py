@@ -79,9 +79,8 @@ def filled(run: Run, track: str, layout: Layout) -> TextTable:
     fields += [column for column, _, _ in shown]
     caption = captioned(f"{layout.caption}{run.design.of_suite}", run.presentation(track))
     notes = (*track_notes(run, track), *layout.notes, *_sample_notes(run, track))
-    return TextTable.of(
-        pd.DataFrame(rows, columns=None if rows else ["model"]), caption, fields, notes
-    )
+    frame = pd.DataFrame(rows, columns=None if rows else ["model"])
+    return TextTable.of(frame, caption, fields, notes)
 
 
 def _shown(
@@ -418,12 +417,10 @@ def beside_paper(run: Run) -> TextTable | None:
         return None
     rows: dict[tuple[str, str], dict[str, object]] = {}
     for row in frame.to_dict("records"):
-        model, metric, name = row["model"], row["metric"], row["published_name"]
+        model, metric, name, cell = row["model"], row["metric"], row["published_name"], row["cell"]
         about = {"model": model if name == model else f"{model} ({name})"}
         shown = rows.setdefault((model, metric), {**about, "metric": _METRICS[metric]})
-        shown |= {
-            f"{row['cell']} {part}": row[part] for part in ("published", "ours", "difference")
-        }
+        shown |= {f"{cell} {part}": row[part] for part in ("published", "ours", "difference")}
     headings = {cell.name: cell.heading for cell in run.cells("full_planning")}
     columns = [Column.text("model", "Model", once=True), Column.text("metric", "")]
     for cell in dict.fromkeys(frame["cell"]):

@@ -171,22 +171,10 @@ class _Rows(io.StringIO):
 _ESCAPES_LATEX = str.maketrans(
     {c: f"\\{c}" for c in "&%$#_{}"}
     | {c: f"{{{c}}}" for c in "[]*"}
-    | {
-        "\\": r"\textbackslash{}",
-        "~": r"\textasciitilde{}",
-        "^": r"\textasciicircum{}",
-        "<": r"\textless{}",
-        ">": r"\textgreater{}",
-        "|": r"\textbar{}",
-        '"': r"\char34{}",
-        "`": r"\textasciigrave{}",
-        "“": "``",
-        "”": "''",
-        "±": r"$\pm$",
-        "×": r"$\times$",  # noqa: RUF001
-        NO_VALUE: r"\textendash{}",
-        "\n": " ",
-    }
+    | {"\\": r"\textbackslash{}", "~": r"\textasciitilde{}", "^": r"\textasciicircum{}"}
+    | {"<": r"\textless{}", ">": r"\textgreater{}", "|": r"\textbar{}", NO_VALUE: r"\textendash{}"}
+    | {"`": r"\textasciigrave{}", '"': r"\char34{}", "“": "``", "”": "''", "\n": " "}
+    | {"±": r"$\pm$", "×": r"$\times$"}  # noqa: RUF001
 )
 _LIGATURE = re.compile("-(?=-)")
 

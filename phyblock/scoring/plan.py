@@ -51,8 +51,7 @@ class Counts:
 def ratio_of(sums: Floats) -> Floats:
     """Part / whole of counts (..., [part, whole]), such as right answers / answers.
 
-    NaN where the whole is 0, or the part is larger and so no share of it: the paper's criterion
-    `membership` counts repeated steps again.
+    NaN where the whole is 0, or less than the part: `membership` counts repeated steps again.
     """
     part, whole = sums[..., 0], sums[..., 1]
     out = np.full(part.shape, np.nan)
@@ -76,9 +75,8 @@ def chance(subtask: Subtask, n_options: int = 4) -> float:
 ErrorType = Literal["shape_not_in_gt", "overflow", "incorrect_orientation", "dependency_not_met"]
 ERROR_TYPES: tuple[ErrorType, ...] = get_args(ErrorType)
 """The four types of wrong steps (paper appendix B.3), exhaustive and exclusive: the first that
-holds at the step. No goal block has this type and color; every such block is already placed; an
-unplaced one exists, but none that equals the candidate under the setting (A only); an unplaced
-equal one exists but is not ready."""
+holds. No goal block has this type and color; every such block is placed; an unplaced one exists,
+but none that equals the candidate (setting A only); an unplaced equal one is not ready."""
 
 BlockOutcome = Literal[
     "placed",
@@ -252,9 +250,8 @@ def most_placed(goal: Goal, plan: Plan) -> int:
                 free = ~placed
                 ready = [(v, itself) for v, itself, needed in ways if needed & free == itself]
                 if len(ready) > 1:
-                    ready = list(
-                        {goal.graph.unlocks[way[0]]: way for way in reversed(ready)}.values()
-                    )
+                    by_role = {goal.graph.unlocks[way[0]]: way for way in reversed(ready)}
+                    ready = list(by_role.values())
                 reached.update([placed | itself for _, itself in ready] or [placed])
             frontier = reached
     return max(mask.bit_count() for mask in frontier)

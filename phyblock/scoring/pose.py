@@ -4,12 +4,10 @@ Each step is matched to an unplaced, ready block that equals its candidate, for 
 place a block in setting A. Among such matchings, the one whose steps meet the most tolerances in
 total is used, and among equals the one with the smallest distances.
 
-For the motion, every pair of steps laid on a pair of equal goal blocks is a hypothesis; the best
-are refined by weighted least squares over the blocks that they match. The result does not depend on
-the position and direction of the plan.
+For the motion, every pair of steps laid on a pair of equal goal blocks is a hypothesis; weighted
+least squares over matched blocks refine the best. The plan's place and direction change nothing.
 
-Also the error type of each step, the goal blocks that a finished structure reaches, and exact
-volumes of intersections of convex pieces.
+Also the errors of steps, the goal blocks that are reached, and the volumes that blocks share.
 """
 
 from __future__ import annotations
@@ -120,8 +118,7 @@ def matched(goal: Goal, numbers: Sequence[int], near: Nearness) -> tuple[int | N
     """The goal block of each step. Raises KeyError for a number that no candidate has.
 
     Unless the cheapest assignment is a valid order, search step by step over sets of placed blocks,
-    each with the cheapest path to it. As many steps as cannot be matched at all may be skipped if a
-    later one fits better.
+    each with the cheapest path to it; steps may be skipped if not all of them can be matched.
     """
     most = most_placed(goal, Plan(tuple(numbers)))
     vertices = assigned(near)
@@ -155,7 +152,6 @@ def matched(goal: Goal, numbers: Sequence[int], near: Nearness) -> tuple[int | N
     return tuple(steps_back(history, best))
 
 
-_WIDEST_CM = TOLERANCES_CM[-1]
 _APART_CM = 1.0
 """Least distance of two steps from which a direction is computed."""
 _MOST_PAIRS = 6000
@@ -249,10 +245,9 @@ class Alignment:
         turn = before.turn_rad if is_one_place else math.atan2(across, along)
         cosine, sine = math.cos(turn), math.sin(turn)
         x, y = (float(part) for part in middle)
-        return Motion(
-            turn,
-            (float(target[0]) - cosine * x + sine * y, float(target[1]) - sine * x - cosine * y),
-        )
+        shift_x = float(target[0]) - cosine * x + sine * y
+        shift_y = float(target[1]) - sine * x - cosine * y
+        return Motion(turn, (shift_x, shift_y))
 
     def _hypotheses(self) -> tuple[Floats, Floats]:
         """Turns (h,) [rad] and shifts (h, 2) [cm] that lay steps on equal blocks."""
@@ -265,9 +260,8 @@ class Alignment:
         way, aim = p[step[second]] - p[step[first]], q[vertex[second]] - q[vertex[first]]
         length, wanted = np.hypot(*way.T), np.hypot(*aim.T)
         off = np.round(np.abs(length - wanted), _FAR_DIGITS)
-        kept = np.flatnonzero(
-            (length > _APART_CM) & (wanted > _APART_CM) & (off <= 2 * _WIDEST_CM + 10**-_FAR_DIGITS)
-        )
+        is_long = (length > _APART_CM) & (wanted > _APART_CM)
+        kept = np.flatnonzero(is_long & (off <= 2 * TOLERANCES_CM[-1] + 10**-_FAR_DIGITS))
         kept = kept[np.argsort(off[kept], kind="stable")][:_MOST_PAIRS]
         first, second, way, aim = first[kept], second[kept], way[kept], aim[kept]
         turn = np.arctan2(aim[:, 1], aim[:, 0]) - np.arctan2(way[:, 1], way[:, 0])
@@ -438,10 +432,9 @@ PoseError = Literal[
 POSE_ERRORS: tuple[PoseError, ...] = get_args(PoseError)
 """Errors of a step, of which the first that applies counts. The goal does not need a block of its
 kind, or not so often (`wrong_kind`); no such goal block has its orientation (`wrong_rotation`); a
-block that it rests on is missing (`too_early`); its place is farther than `ERROR_TOLERANCE_CM` from
-that of its goal block, mainly sideways or mainly in height (`off_sideways`, `off_height`); it
-overlaps others or the floor (`interpenetrating`); when released, it does not stay (`floating`), or
-others do not (`toppling`)."""
+block that it rests on is missing (`too_early`); it is more than `ERROR_TOLERANCE_CM` from its goal
+block, mainly sideways or mainly in height (`off_sideways`, `off_height`); it overlaps others or the
+floor (`interpenetrating`); when released, it (`floating`) or others (`toppling`) do not stay."""
 ERROR_TOLERANCE_CM = 1.0
 
 
@@ -455,10 +448,7 @@ _PHYSICAL: dict[StepEnd, PoseError] = {
 
 
 def pose_errors(
-    goal: Goal,
-    numbers: Sequence[int],
-    fits: Sequence[PoseFit | None],
-    ends: Sequence[StepEnd],
+    goal: Goal, numbers: Sequence[int], fits: Sequence[PoseFit | None], ends: Sequence[StepEnd]
 ) -> tuple[PoseError | None, ...]:
     """Return the error of each step, None for one that is right and stands.
 

@@ -16,8 +16,7 @@ common: the standard deviation of the levels' means. Items are crossed with the 
 with *blocks*: the combinations of everything else that was varied. It is a method-of-moments
 estimate with items as a random facet (Cornfield and Tukey, *Average values of mean squares in
 factorials*, Annals of Mathematical Statistics 27, 1956; Brennan, *Generalizability Theory*, 2001).
-Items of common origin are not an independent sample, so the error of the levels' means comes from
-the jackknife.
+Items of common origin are no independent sample, so the jackknife gives the error of the means.
 """
 
 from __future__ import annotations
@@ -89,18 +88,13 @@ class Estimate:
 
 
 def jackknife(
-    counts: ArrayLike,
-    clusters: Clusters,
-    metric: Metric,
-    *,
-    n_clusters: ArrayLike | None = None,
+    counts: ArrayLike, clusters: Clusters, metric: Metric, *, n_clusters: ArrayLike | None = None
 ) -> Estimate:
     """Estimate `metric` of the summed `counts`, with a t test against zero and its interval.
 
     `counts` has shape (units, *cells, counts of a cell); the result has that of `metric` of the
     sums, usually (*cells,). A metric that subtracts one cell from another is a paired comparison.
-    `n_clusters`, of the result's shape, is the number of clusters behind each value where some
-    cells lack units. Without units there is no value.
+    `n_clusters`, of the result's shape, counts the clusters behind each value if cells lack units.
 
     For units of one cluster each, the interval of a mean is Student's. The variance is never less
     than that of independent units, which keeps it above zero where units of common origin differ in
@@ -169,9 +163,8 @@ def in_range(estimate: Estimate, most: ArrayLike = 1.0) -> Estimate:
     # Rounding must not leave a value outside of its interval.
     lo, hi = np.minimum(centre - half, value), np.maximum(centre + half, value)
     lo, hi = np.maximum(lo, 0.0), np.minimum(hi, end)
-    return replace(
-        estimate, lo=np.where(known, lo, estimate.lo), hi=np.where(known, hi, estimate.hi)
-    )
+    lo, hi = np.where(known, lo, estimate.lo), np.where(known, hi, estimate.hi)
+    return replace(estimate, lo=lo, hi=hi)
 
 
 def bounded(estimate: Estimate, most: float) -> Estimate:

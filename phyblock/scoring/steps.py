@@ -2,9 +2,8 @@
 
 A move names a candidate, not a block, so it may have placed any of several goal blocks. An assembly
 keeps every set of placed blocks that explains the moves that succeeded (as the `optimal` matcher
-does for whole plans), and a move succeeds when one of them allows it: so no valid order can fail.
-One of these sets is the world that is shown; if only another one allows a move, blocks that look
-the same change places.
+does for whole plans); a move succeeds when one of them allows it, so no valid order can fail. One
+set is the world that is shown; if only another one allows a move, equal blocks change places.
 """
 
 from __future__ import annotations
@@ -26,8 +25,7 @@ MOVE_OUTCOMES: tuple[MoveOutcome, ...] = ("placed", *ERROR_TYPES, "invalid")
 class Move:
     """The effect of one move: `vertex` is the goal block that it placed, or None.
 
-    `swapped` are pairs (from, to) of vertices between which earlier blocks changed places so that
-    this move could succeed.
+    `swapped` are pairs (from, to) of vertices between which earlier blocks changed places for it.
     """
 
     outcome: MoveOutcome
@@ -45,9 +43,7 @@ def gated(scene: Scene, gating: Gating) -> Scene:
         return scene
     layers = scene.graph.layers
     at = list(zip(scene.blocks, layers, strict=True))
-    below = {
-        layer: tuple(block.order for block, lower in at if lower < layer) for layer in set(layers)
-    }
+    below = {n: tuple(block.order for block, layer in at if layer < n) for n in set(layers)}
     return replace(scene, blocks=tuple(replace(block, depend=below[layer]) for block, layer in at))
 
 
@@ -98,9 +94,7 @@ class Assembly:
         """
         if not 1 <= index <= len(self.candidates):
             return Move("invalid")
-        reached = {
-            mask | 1 << vertex for mask in self._frontier for vertex in self._choices(index, mask)
-        }
+        reached = {mask | 1 << v for mask in self._frontier for v in self._choices(index, mask)}
         if not reached:
             return Move(self._goal.error(index, self.placed))
         before = self.placed

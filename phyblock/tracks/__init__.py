@@ -1,4 +1,1 @@
-"""One module per track: its requests, the parsing and scoring of replies, baselines and records.
-
-`phyblock.registry` lists the tracks. Outside this package, only commands of a track name it.
-"""
+"""Tracks, one module each: requests, judgement, baselines, records; the registry lists them."""

@@ -39,8 +39,7 @@ from phyblock.tracks.prompts import Prompt, TemplatePrompt
 from phyblock.types import AnswerFormat, CandidateOrder
 
 ENGINE = "physics"
-"""Key in a track's identity of the physics engine that affects its results, unless it is the
-reference engine. Results of the engine are in the records."""
+"""Key in a track's identity of the physics engine, unless that is the reference engine."""
 EXECUTION = "execution"
 """Key of the version of plan execution and its measurements."""
 
@@ -89,8 +88,7 @@ class Episode(Protocol):
 class Choice:
     """One thing to pick: its name in the prompt, and its text if it has one.
 
-    It is in the last picture of each label: the whole picture, or `cell`, from 0, of the grid in
-    the square at the right end.
+    It is in the last picture of each label: all of it, or `cell`, from 0, of the grid at its right.
     """
 
     name: str
@@ -134,9 +132,8 @@ class Pick:
 class Picking:
     """An answer made of choices that are picked one after another.
 
-    `least` to `most` are picked, with `repeats` any of them repeatedly; `noun` is the name of one
-    pick. `fields` are the numbers that go with each. `write` makes the reply in the form that the
-    prompt asks for. `task` says in one line what to do.
+    `least` to `most` are picked, with `repeats` any of them repeatedly; `noun` is one pick's name,
+    `fields` are its numbers. `write` makes the reply; `task` says in one line what to do.
     """
 
     choices: tuple[Choice, ...]
@@ -156,8 +153,7 @@ class Picking:
     def reply(self, picks: Sequence[Pick]) -> str:
         """Return the reply made of picks.
 
-        Raises ValueError for too few or too many, unknown places, repeats that are not allowed,
-        and numbers that are missing or not allowed.
+        Raises ValueError for too few or many, wrong places or repeats, and numbers not allowed.
         """
         places = [pick.place for pick in picks]
         is_answer = (
@@ -368,11 +364,9 @@ class Track(ABC):
             keys = [[one.key for one in found] for found in map(self.drawings, shown) if found]
             version = {"name": self.prompt.name, "version": self.prompt.version}
             identity = {"prompt": version, "pictures": hex_digest(json.dumps(keys))}
-        if self.simulates and getattr(self.spec, "physics", "") != "off":
-            engine = physics_engine()
-            if engine.name != REFERENCE_ENGINE:
-                about = {"engine": engine.name, engine.name: engine_version(engine.name)}
-                identity[ENGINE] = about
+        is_simulated = self.simulates and getattr(self.spec, "physics", "") != "off"
+        if is_simulated and (engine := physics_engine().name) != REFERENCE_ENGINE:
+            identity[ENGINE] = {"engine": engine, engine: engine_version(engine)}
         return identity
 
     async def request(

@@ -72,9 +72,7 @@ class PlanRecord(Record):
 
 @dataclass(frozen=True)
 class PlanSubject:
-    """The scene that baselines and people answer about; `guess` returns a plan learned without
-    the goal, or with only the areas of its colors if it `sees_colors`.
-    """
+    """A scene to plan; `guess` never sees the goal, or of it only color areas (`sees_colors`)."""
 
     scene: Scene
     candidates: CandidateSet
@@ -159,8 +157,6 @@ def goal_blind_plans(
     Each combination of key, threshold and order makes plans; a scene uses the one that scores best
     on unrelated scenes. Without `repeats` no candidate is named twice. `areas` are the goals'.
     """
-    if not scenes:
-        return {}
     kin, seen = related(scenes), areas or {}
     goals = [Goal(scene, candidates[scene.id], setting) for scene in scenes]
     offered = [units(candidates[one.id], setting, seen.get(one.id)) for one in scenes]
@@ -188,9 +184,8 @@ def goal_blind_plans(
         tp = most_placed(goals[place], plan)
         return tp, len(plan) + len(goals[place].graph) - 2 * tp
 
-    counts = np.array(
-        [[score(place, plan) for place, plan in enumerate(way)] for way in ways], dtype=np.int64
-    )
+    scores = [[score(place, plan) for place, plan in enumerate(way)] for way in ways]
+    counts = np.array(scores, dtype=np.int64)
     total = counts.sum(axis=1)
     plans = {}
     for place, (scene, others) in enumerate(zip(scenes, kin, strict=True)):
@@ -283,9 +278,8 @@ def blind_guesses(
 ) -> Callable[..., Plan]:
     """Return a function from a task of a pool and a view to its plan, in the numbers shown.
 
-    A plan that `sees_colors` also uses their areas in the picture of the goal. A place in the list
-    is informative only in the file's order, so plans are learned separately for every order. The
-    task's own goal is never used, in whatever order it is shown.
+    A plan that `sees_colors` also uses their areas in the picture of the goal. Plans are learned
+    for every order, as a place tells something in the file's. The task's own goal is never used.
     """
 
     @functools.cache
@@ -309,7 +303,7 @@ def plan_text(steps: Iterable[int]) -> str:
     return "\n".join(f"Step{i}: Move block with index {n}" for i, n in enumerate(steps, 1))
 
 
-_RANDOM_STEPS = 4
+RANDOM_STEPS = 4
 """The number of steps in the paper's Random row."""
 
 
@@ -317,10 +311,8 @@ def _in_valid_order(choose: Callable[[PlanSubject, Block, np.random.Generator], 
     """Return the rule that takes a random valid order, and chooses a candidate for each block."""
 
     def rule(subject: PlanSubject, rng: np.random.Generator) -> str:
-        blocks, order = subject.scene.blocks, subject.scene.graph.random_order(rng)
-        return plan_text(
-            choose(subject, blocks[v], rng) or needed_candidate(subject, blocks[v]) for v in order
-        )
+        blocks = [subject.scene.blocks[v] for v in subject.scene.graph.random_order(rng)]
+        return plan_text(choose(subject, b, rng) or needed_candidate(subject, b) for b in blocks)
 
     return rule
 
@@ -345,9 +337,8 @@ def needed_candidate(subject: Any, block: Block) -> int:
 def pose_counts(item: AssemblyTask, record: Any) -> tuple[int, ...]:
     """Count the kinds that a plan or an episode names and whose pose could be wrong.
 
-    These are needed in some poses and offered in others, too. Returns the number that is first
-    named in a right pose and the total, for kinds whose first listed pose is right, then for all
-    others. Numbers that no candidate has are ignored.
+    These are needed in some poses and offered in others, too. Returns the number first named in a
+    right pose and the total, for kinds whose first listed pose is right, then for all others.
     """
     offered, chosen = item.offered, dict[Kind, bool]()
     for step in record.parse.plan:
@@ -403,7 +394,7 @@ class FullPlanning(SceneTrack):
     template = bundled("prompts", "full_planning.j2")
     baselines: ClassVar = {
         "random": lambda subject, rng: plan_text(
-            rng.integers(1, len(subject.candidates) + 1, _RANDOM_STEPS).tolist()
+            rng.integers(1, len(subject.candidates) + 1, RANDOM_STEPS).tolist()
         ),
         "all-candidates": lambda subject, _: plan_text(range(1, len(subject.candidates) + 1)),
         "goal-blind": lambda subject, _: plan_text(subject.guess().steps),
@@ -466,13 +457,5 @@ class FullPlanning(SceneTrack):
             self._scorers[key] = AssemblyScorer(item.scene, item.candidates, suite.settings)
         level1 = None if suite.scoring.level1 == "aov" else suite.scoring.level1
         scores = self._scorers[key].score(parsed.plan, suite.scoring.matchers, level1)
-        parse = {
-            "parser": suite.parser,
-            "plan": parsed.plan.steps,
-            **{n: getattr(parsed, n) for n in ("rule", "dropped", "problem", "truncated")},
-        }
-        fields = {"parse": parse, "scores": list(scores)}
-        return Judgement(parsed.rule is not None, fields)
-
-
-TRACK = FullPlanning
+        parse = {"parser": suite.parser, **vars(parsed), "plan": parsed.plan.steps}
+        return Judgement(parsed.rule is not None, {"parse": parse, "scores": scores})

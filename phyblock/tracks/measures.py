@@ -1,7 +1,6 @@
 """Measures of a track: counts of samples, the cells that they are summed in, values of the sums.
 
-A YAML file beside a track's module, with its name, declares its headline, notes, measures and
-tables; `read_report` joins it with the counts.
+The YAML file of a track declares headline, notes, measures and tables; `read_report` reads it.
 """
 
 from __future__ import annotations
@@ -10,23 +9,18 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 
+from phyblock.config.suite import Suite
 from phyblock.files import read_own_yaml
-from phyblock.scoring.plan import mean_of, ratio_of
+from phyblock.records.files import Manifest
+from phyblock.records.record import Record
+from phyblock.scoring.plan import Metric, mean_of, ratio_of
 
-if TYPE_CHECKING:
-    from phyblock.config.suite import Suite
-    from phyblock.records.files import Manifest
-    from phyblock.records.record import Record
-    from phyblock.scoring.plan import Metric
-
-Way = tuple[str, str, str]
-"""Setting, matcher and criterion of a score; "" where there is no choice."""
 SCORED_BY = ("setting", "matcher", "criterion")
-"""Columns of the parts of a `Way`."""
+"""Columns of the way in which a score was counted; "" where there is no choice."""
 OVERALL = "overall"
 """The name of the cell of all samples."""
 Better = Literal["higher", "lower"]
@@ -71,9 +65,8 @@ class SampleCounts:
     numbers. Instead, `record` counts a record when it is read, or `score` each of its scores. None
     means that the sample is not counted. `cells` replace those of the track.
 
-    With `parts`, the samples of one group, such as the rotations of a question, count as one, which
-    is right only if all `parts` are. `same` names fields of `run.yaml` that affect the counts:
-    runs that differ in one cannot be compared.
+    With `parts`, the samples of one group, such as the rotations of a question, count as one, right
+    only if all `parts` are. Runs that differ in a field `same` of `run.yaml` cannot be compared.
     """
 
     name: str
@@ -85,7 +78,7 @@ class SampleCounts:
     parts: Callable[[Suite], int] | None = None
     same: tuple[str, ...] = ()
 
-    def of(self, record: Record) -> Iterator[tuple[Way, Sequence[float]]]:
+    def of(self, record: Record) -> Iterator[tuple[tuple[str, str, str], Sequence[float]]]:
         """Yield the counts of a record with the way in which each was scored."""
         if self.record is not None and (numbers := self.record(record)):
             yield ("", "", ""), numbers

@@ -25,7 +25,6 @@ from phyblock.text import hex_digest
 from phyblock.types import BACKGROUNDS, View
 
 _Result = TypeVar("_Result")
-_WORKERS = 4
 _KEPT = 256
 """Pictures kept in memory: more than are in use at once."""
 _PNG_START, _PNG_END = b"\x89PNG\r\n\x1a\n", b"IEND\xaeB`\x82"
@@ -64,7 +63,7 @@ class Workshop:
         """Without `workers`, as many as there are processors, at most four."""
         self.rendered = 0
         self._folder = folder or files.cache_dir() / "pictures"
-        self._workers = workers or min(_WORKERS, os.cpu_count() or 1)
+        self._workers = workers or min(4, os.cpu_count() or 1)
         self._pool: Executor | None = None
         self._alone = asyncio.Lock()
         self._drawn: defaultdict[str, asyncio.Lock] = defaultdict(asyncio.Lock)

@@ -31,7 +31,7 @@ from phyblock.sim.pictures import goal_style, kit_key, kit_png, ruled_key, ruled
 from phyblock.text import plain_sum
 from phyblock.tracks import base
 from phyblock.tracks.base import Judgement, NumberField, Pick, Picking, SceneTrack
-from phyblock.tracks.full_planning import PlanParse, PlanSubject, needed_candidate
+from phyblock.tracks.full_planning import RANDOM_STEPS, PlanParse, PlanSubject, needed_candidate
 from phyblock.tracks.measures import SampleCounts, level_cells
 from phyblock.tracks.pictures import Drawing, picture_style
 from phyblock.types import REFUSED_ENDS, STEP_ENDS, Matcher, Setting, StepEnd, View
@@ -46,7 +46,6 @@ _LIMITS = {**EXECUTION_LIMITS, **_REACHED}
 """Tolerances of execution, as records hold them: a goal block is reached if a block of its kind
 ends up at most `reached_cm` from it, turned by at most `reached_deg`."""
 _DIGITS = 4
-_RANDOM_STEPS = 4
 _RANDOM_REACH_CM = 15.0
 _STILL_M, _STILL_DEG = 0.001, 1.0
 """A block that moved by no more than this counts as unmoved."""
@@ -177,10 +176,9 @@ class PoseRecord(Record):
             if block is not None and step.end not in REFUSED_ENDS:
                 world[n] = block
             for rest in step.rests:
-                place = origin_m(world[rest.step].type, rest.euler_deg, rest.center_cm)
-                world[rest.step] = replace(
-                    world[rest.step], position_m=place, euler_deg=rest.euler_deg
-                )
+                moved = world[rest.step]
+                place = origin_m(moved.type, rest.euler_deg, rest.center_cm)
+                world[rest.step] = replace(moved, position_m=place, euler_deg=rest.euler_deg)
         return tuple(world.values())
 
 
@@ -216,14 +214,9 @@ def judge_poses(
     named = [number for number in numbers if 1 <= number <= n]
     of_plans = AssemblyScorer(item.scene, item.candidates, settings)
     scores = of_plans.score(Plan(tuple(named)), matchers, None)
-    parse = {
-        "parser": "poses",
-        "rule": parsed.rule,
-        "plan": named,
-        "dropped": [number for number in numbers if not 1 <= number <= n],
-        "problem": parsed.problem,
-        "steps": steps,
-    }
+    dropped = [number for number in numbers if not 1 <= number <= n]
+    parse: dict[str, Any] = {"parser": "poses", "rule": parsed.rule, "problem": parsed.problem}
+    parse |= {"plan": named, "dropped": dropped, "steps": steps}
     scored = [
         {
             "vertex": None,
@@ -235,7 +228,7 @@ def judge_poses(
     ]
     right = {score.frame: list(score.right) for score in poses}
     judged = {**done, "right": right, "steps": scored}
-    fields = {"parse": parse, "scores": list(scores), "pose": judged}
+    fields = {"parse": parse, "scores": scores, "pose": judged}
     return Judgement(parsed.rule is not None, fields)
 
 
@@ -253,10 +246,8 @@ def _executed(scene: Scene, blocks: Sequence[Block | None]) -> dict[str, Any]:
             before, after = lies[block.order], Pose.goal(block)
             if before.distance_m(after) > _STILL_M or before.angle_deg(after) > _STILL_DEG:
                 lies[block.order] = after
-                place = [round(part, 2) + 0.0 for part in center_cm(block)]
-                rests.append(
-                    {"step": block.order, "center_cm": place, "euler_deg": block.euler_deg}
-                )
+                at = [round(part, 2) + 0.0 for part in center_cm(block)]
+                rests.append({"step": block.order, "center_cm": at, "euler_deg": block.euler_deg})
         steps.append({**{name: getattr(step, name) for name in _ENDED}, "rests": rests})
     return {
         "steps": steps,
@@ -284,8 +275,7 @@ def _built(
 ) -> str:
     """Answer with the goal's blocks in a random valid order that keeps balance, each moved.
 
-    Each step takes the first block with which the structure surely stands, else the first with
-    which it is in balance at all, else the first.
+    Each step takes the first block that surely stands, else the first in balance, else the first.
     """
     blocks, graph = subject.scene.blocks, subject.scene.graph
     drawn = rng.random(len(blocks)).tolist()
@@ -337,7 +327,7 @@ def _stack(subject: PlanSubject, rng: np.random.Generator) -> str:
 def _random(subject: PlanSubject, rng: np.random.Generator) -> str:
     """Answer with any blocks anywhere, without seeing the goal."""
     steps = []
-    for _ in range(_RANDOM_STEPS):
+    for _ in range(RANDOM_STEPS):
         number = int(rng.integers(1, len(subject.candidates) + 1))
         x, y = rng.uniform(-_RANDOM_REACH_CM, _RANDOM_REACH_CM, 2).tolist()
         steps.append(PoseStep(number, (x, y, float(rng.uniform(0.0, _RANDOM_REACH_CM)))))
@@ -475,6 +465,3 @@ class PosePlanning(SceneTrack):
         rules = (self.suite.settings, self.suite.scoring.matchers, earlier)
         found: Judgement = await self.compute(partial(judge_poses, item, text, *rules))
         return found
-
-
-TRACK = PosePlanning

@@ -19,7 +19,6 @@ from phyblock.text import did_you_mean, hex_digest
 _LARGEST_BYTES = 256 * 1024
 _BLOCKS = ("system", "user", "caption", "answer")
 """Blocks that templates may have; no other would be sent."""
-_OTHER_FILES = (nodes.Extends, nodes.Include, nodes.Import, nodes.FromImport)
 
 
 @dataclass(frozen=True)
@@ -69,7 +68,9 @@ class TemplatePrompt:
         del self._environment.globals["lipsum"]
         try:
             tree = self._environment.parse(text)
-            others = list(tree.find_all(_OTHER_FILES))
+            others = [
+                *tree.find_all((nodes.Extends, nodes.Include, nodes.Import, nodes.FromImport))
+            ]
             self._template = self._environment.get_template(name)
         except Exception as error:
             # A text may be too deeply nested to be walked, and Python compiles Jinja's output.

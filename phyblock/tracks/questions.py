@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -46,9 +47,6 @@ from phyblock.tracks.measures import OVERALL, WHOLE, Cell, SampleCounts
 from phyblock.tracks.pictures import Drawing, picture_style
 from phyblock.types import DataFormat
 
-BUILTIN_QUESTIONS = "phyblock-vqa"
-"""The question set of suites that name none."""
-
 
 class VqaSpec(PictureControls):
     """The questions of the vqa track and their presentation."""
@@ -56,7 +54,7 @@ class VqaSpec(PictureControls):
     format: DataFormat = "builtin"
     """builtin: a folder with questions.jsonl. official: a folder with question files in the
     official JSON form and their pictures."""
-    path: Annotated[str, Field(min_length=1)] = BUILTIN_QUESTIONS
+    path: Annotated[str, Field(min_length=1)] = "phyblock-vqa"
     """A bundled set (phyblock-vqa) or a folder, as in dataset.path; about the scenes of dataset."""
     subtasks: UniqueSome[SubtaskName] = (*SUBTASKS,)
     """Subtasks to ask about."""
@@ -356,14 +354,10 @@ class Vqa(Track):
     def open(self) -> None:
         """Select questions. Raises SpecError if there are none."""
         suite, spec = self.suite, self.spec
-        self.questions = known = open_questions(
-            spec.format, suite.files.folders[self.name], self.dataset
-        )
-        asked = [
-            task
-            for task in known.tasks
-            if task.question.subtask in spec.subtasks and {*suite.levels} & {*task.scene.levels}
-        ]
+        folder = suite.files.folders[self.name]
+        self.questions = known = open_questions(spec.format, folder, self.dataset)
+        asked = [task for task in known.tasks if task.question.subtask in spec.subtasks]
+        asked = [task for task in asked if {*suite.levels} & {*task.scene.levels}]
         if suite.dataset.difficulty.ranges:
             fitting = {one.key for one in select_tasks(self.dataset.tasks, suite, None)}
             asked = [task for task in asked if task.scene.id in fitting]
@@ -373,11 +367,8 @@ class Vqa(Track):
             found = ", ".join(sorted({task.question.subtask for task in known.tasks}))
             message = "no question is of these subtasks, levels and difficulty"
             raise SpecError(Problem(where, message, "vqa.subtasks", found=f"questions of {found}"))
-        self.items = tuple(
-            AskedQuestion(task, rotation, is_one_of_many=spec.circular)
-            for task in tasks
-            for rotation in range(spec.rotations)
-        )
+        shown = product(tasks, range(spec.rotations))
+        self.items = tuple(AskedQuestion(task, turn, spec.circular) for task, turn in shown)
         self._guess = guesses_of([task.question for task in known.tasks], majority_rule)
 
     def draw(self, item: AskedQuestion) -> tuple[Drawing, ...]:
@@ -442,12 +433,9 @@ class Vqa(Track):
             parsed = parse_answer(text, question.options, question.subtask == "OR")
         given, right = parsed.letters, question.answer_letters
         problem = {"problem": parsed.problem} if parsed.problem else {}
-        fields = {
-            "parse": {"rule": parsed.rule, "letters": given, **problem},
-            "scores": [],
-            "answer": {"right": right, "given": given, "correct": given == right},
-        }
-        return Judgement(parsed.rule is not None, fields)
+        parse = {"rule": parsed.rule, "letters": given, **problem}
+        answer = {"right": right, "given": given, "correct": given == right}
+        return Judgement(parsed.rule is not None, {"parse": parse, "scores": [], "answer": answer})
 
 
 def open_questions(format_name: str, path: Path, dataset: Dataset) -> QuestionSet:
@@ -459,6 +447,3 @@ def open_questions(format_name: str, path: Path, dataset: Dataset) -> QuestionSe
     names = ", ".join(bundled_sets(QUESTIONS_FILE))
     allowed = f"a folder with {QUESTIONS_FILE}, or a bundled set of questions: {names}"
     raise DataError(Problem(str(path), "holds no questions", "vqa.path", allowed=allowed))
-
-
-TRACK = Vqa

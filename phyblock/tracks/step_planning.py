@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import takewhile
-from typing import Any, ClassVar, Literal, get_args
+from typing import Any, ClassVar, Literal, NamedTuple, get_args
 
 import numpy as np
 
@@ -117,9 +117,8 @@ class EpisodeRecord(Record):
 
     exported: ClassVar[Mapping[str, tuple[str, str]]] = {"ending": ("string", "ending")}
 
-    def course(self, matcher: str) -> Course:
+    def course(self, _matcher: str) -> Course:
         """Return the outcome of every step, which does not depend on the matcher."""
-        del matcher
         steps = (
             (str(turn.parse.move), None if turn.outcome in ("placed", "done") else turn.outcome)
             for turn in self.turns
@@ -166,9 +165,7 @@ def _random(subject: StepSubject, rng: np.random.Generator) -> str:
     return step_text(int(rng.integers(1, len(subject.candidates) + 1)))
 
 
-def _right_move(
-    choose: Callable[[StepSubject, int, np.random.Generator], int | None],
-) -> Callable[[StepSubject, np.random.Generator], str]:
+def _right_move(choose: Callable[[StepSubject, int, np.random.Generator], int | None]) -> Any:
     """Return a rule that names the choice for a right move, or Done if no move is right."""
 
     def rule(subject: StepSubject, rng: np.random.Generator) -> str:
@@ -213,8 +210,7 @@ _REASONS: Mapping[str, str] = {
 }
 
 
-@dataclass(frozen=True)
-class PastStep:
+class PastStep(NamedTuple):
     """A past step: its operation, a candidate, `Done` or None, and its outcome."""
 
     operation: int | str | None
@@ -282,9 +278,7 @@ class StepPlanning(SceneTrack):
     }
     record = EpisodeRecord
     counted = (
-        SampleCounts(
-            "moves", ("tp", "fp", "fn"), score=lambda one: (one.tp, one.fp, one.fn), same=_SAME
-        ),
+        SampleCounts("moves", ("tp", "fp", "fn"), score=lambda s: (s.tp, s.fp, s.fn), same=_SAME),
         SampleCounts("episodes", _EPISODES, record=_episodes, same=_SAME),
         POSE_COUNTS,
     )
@@ -432,16 +426,10 @@ class StepEpisode:
         if self._shop is not None:
             drawings = (*track.drawings(task), track.draw_state(task, blocks))
             messages = track.messages(task, await self._shop.images(drawings), self._past)
-        failed = last.get("outcome", "placed") != "placed"
-        subject = StepSubject(
-            task.scene,
-            task.candidates,
-            functools.partial(track.guess, task, track.suite.images.view),
-            assembly.right_moves(),
-            assembly.exact_moves(),
-            self._past[-1].move if failed else None,
-            len(self._turns),
-        )
+        guess = functools.partial(track.guess, task, track.suite.images.view)
+        moves = assembly.right_moves(), assembly.exact_moves()
+        failed = self._past[-1].move if last.get("outcome", "placed") != "placed" else None
+        subject = StepSubject(task.scene, task.candidates, guess, *moves, failed, len(self._turns))
         return self._ask(messages, subject, len(self._turns) + 1)
 
     def take(self, reply: Reply, prompt: SentPrompt | None = None) -> None:
@@ -506,6 +494,3 @@ class StepEpisode:
             "turns": list(self._turns),
         }
         return Judgement(any(turn["parse"]["problem"] is None for turn in self._turns), fields)
-
-
-TRACK = StepPlanning
