@@ -13,7 +13,7 @@ from collections import Counter
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from heapq import heappop, heappush
-from typing import Any, Literal, get_args
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -150,8 +150,7 @@ def _mask(vertices: Iterable[int]) -> int:
     return sum(1 << vertex for vertex in vertices)
 
 
-@dataclass(frozen=True)
-class Match:
+class Match(NamedTuple):
     """The effect of each step of a plan.
 
     For each step, `vertices` has the goal vertex that it placed, or None, and `errors` its error
@@ -422,7 +421,7 @@ class AssemblyScorer:
 
     def score(
         self, plan: Plan, matchers: Sequence[Matcher], level1: Level1Criterion | None
-    ) -> tuple[dict[str, Any], ...]:
+    ) -> list[dict[str, Any]]:
         """Return the fields of a record's scores, by setting, then matcher.
 
         Raises KeyError for an unknown candidate.
@@ -431,7 +430,7 @@ class AssemblyScorer:
 
     def _score(
         self, plan: Plan, matchers: tuple[Matcher, ...], level1: Level1Criterion | None
-    ) -> tuple[dict[str, Any], ...]:
+    ) -> list[dict[str, Any]]:
         scores: list[dict[str, Any]] = []
         for setting, goal in self._goals.items():
             matches = [match_plan(goal, plan, matcher) for matcher in matchers]
@@ -447,4 +446,4 @@ class AssemblyScorer:
             if level1 is not None and 1 in self._scene.levels:
                 counts = vars(level1_counts(goal, plan, level1))
                 scores.append({"criterion": level1, "setting": setting, **counts, **_ONLY_AOV})
-        return tuple(scores)
+        return scores

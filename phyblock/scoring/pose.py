@@ -17,7 +17,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -162,8 +162,7 @@ _FAR_DIGITS = 6
 _PLACE_DIGITS = 3
 
 
-@dataclass(frozen=True)
-class Motion:
+class Motion(NamedTuple):
     """A turn about the vertical through the origin, then a shift along the floor [cm]."""
 
     turn_rad: float = 0.0

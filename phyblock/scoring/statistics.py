@@ -25,6 +25,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -244,8 +245,7 @@ def rank_ranges(is_better: ArrayLike) -> NDArray[np.intp]:
 _TAIL = (1 - CONFIDENCE) / 2
 
 
-@dataclass(frozen=True)
-class Component:
+class Component(NamedTuple):
     """A standard deviation with its 95 % interval; NaN where it cannot be estimated."""
 
     sd: float

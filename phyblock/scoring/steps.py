@@ -10,8 +10,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import Literal
+from dataclasses import replace
+from typing import Literal, NamedTuple
 
 from phyblock.domain.scene import CandidateSet, Scene
 from phyblock.scoring.plan import ERROR_TYPES, Counts, ErrorType, Goal
@@ -21,8 +21,7 @@ MoveOutcome = Literal["placed", "invalid"] | ErrorType
 MOVE_OUTCOMES: tuple[MoveOutcome, ...] = ("placed", *ERROR_TYPES, "invalid")
 
 
-@dataclass(frozen=True)
-class Move:
+class Move(NamedTuple):
     """The effect of one move: `vertex` is the goal block that it placed, or None.
 
     `swapped` are pairs (from, to) of vertices between which earlier blocks changed places for it.

@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, ClassVar, Literal, Protocol, TypeVar
+from typing import Any, ClassVar, Literal, NamedTuple, Protocol, TypeVar
 
 from pydantic import BaseModel, create_model
 
@@ -60,8 +60,7 @@ ItemT = TypeVar("ItemT", bound=Item)
 _T = TypeVar("_T")
 
 
-@dataclass(frozen=True)
-class Judgement:
+class Judgement(NamedTuple):
     """A parsed and scored reply: `fields` of its record, such as `parse` and `scores`."""
 
     is_read: bool
@@ -84,8 +83,7 @@ class Episode(Protocol):
         """Return the judgement of the replies; its fields hold `turns`, one mapping per reply."""
 
 
-@dataclass(frozen=True)
-class Choice:
+class Choice(NamedTuple):
     """One thing to pick: its name in the prompt, and its text if it has one.
 
     It is in the last picture of each label: all of it, or `cell`, from 0, of the grid at its right.
@@ -120,8 +118,7 @@ class NumberField:
     leap: float
 
 
-@dataclass(frozen=True)
-class Pick:
+class Pick(NamedTuple):
     """A choice, by its place among them from 0, and the numbers that go with it."""
 
     place: int

@@ -14,7 +14,7 @@ from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Seq
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import product
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,8 +91,7 @@ Areas = Mapping[str, float]
 """Share of each color in the area of blocks in a picture; colors not shown are absent."""
 
 
-@dataclass(frozen=True)
-class Unit:
+class Unit(NamedTuple):
     """A group of candidates that are equal under a setting: one in A, all of a kind in B.
 
     `numbers` are its candidates', `candidate` the first; `poses` is how many its kind has, `rank`
@@ -278,8 +277,8 @@ def blind_guesses(
 ) -> Callable[..., Plan]:
     """Return a function from a task of a pool and a view to its plan, in the numbers shown.
 
-    A plan that `sees_colors` also uses their areas in the picture of the goal. Plans are learned
-    for every order, as a place tells something in the file's. The task's own goal is never used.
+    A plan that `sees_colors` also uses their areas in the picture of the goal. Each order has its
+    own plans, as places in the file's are informative. The task's own goal is never used.
     """
 
     @functools.cache

@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -27,8 +27,7 @@ Better = Literal["higher", "lower"]
 Unit = Literal["%", "cm", "degrees", "steps", "blocks", ""]
 
 
-@dataclass(frozen=True)
-class Cell:
+class Cell(NamedTuple):
     """A part of a track, such as a level or a subtask: a column of its tables.
 
     Its value comes from the sum of its samples, under its own criterion if there are several. If
@@ -48,13 +47,9 @@ WHOLE = Cell(OVERALL, "Overall")
 
 def level_cells(suite: Suite, _: Manifest) -> tuple[Cell, ...]:
     """Return the levels of a suite, then all scenes; Level 1 alone is scored without an order."""
-    level1 = suite.scoring.level1
-    levels = [
-        Cell(str(n), f"Level {n}", criterion=level1 if n == 1 else "aov")
-        for n in sorted(suite.levels)
-    ]
-    whole = level1 if set(suite.levels) == {1} else "aov"
-    return (*levels, Cell(OVERALL, "Overall", criterion=whole))
+    criteria = {n: suite.scoring.level1 if n == 1 else "aov" for n in sorted(suite.levels)}
+    levels = [Cell(str(n), f"Level {n}", criterion=one) for n, one in criteria.items()]
+    return (*levels, Cell(OVERALL, "Overall", criterion=levels[-1].criterion))
 
 
 @dataclass(frozen=True)
@@ -145,8 +140,7 @@ def in_unit(heading: str, unit: str) -> str:
     return f"{heading} ({unit})" if unit else heading
 
 
-@dataclass(frozen=True)
-class LayoutColumn:
+class LayoutColumn(NamedTuple):
     """Columns of a table: one per measure, in one cell or in several.
 
     `measures` are names, with headings where they differ from the measure's own. `cells` are `one`
@@ -182,8 +176,7 @@ class LayoutColumn:
         return [cell for cell in parts if self.cells != "means" or cell.of]
 
 
-@dataclass(frozen=True)
-class Layout:
+class Layout(NamedTuple):
     """A table by model or, by `rows`, by model and cell or measure; if `drawn`, also a figure."""
 
     caption: str

@@ -45,7 +45,6 @@ _REACHED = {"reached_cm": 1.0, "reached_deg": 10.0}
 _LIMITS = {**EXECUTION_LIMITS, **_REACHED}
 """Tolerances of execution, as records hold them: a goal block is reached if a block of its kind
 ends up at most `reached_cm` from it, turned by at most `reached_deg`."""
-_DIGITS = 4
 _RANDOM_REACH_CM = 15.0
 _STILL_M, _STILL_DEG = 0.001, 1.0
 """A block that moved by no more than this counts as unmoved."""
@@ -163,8 +162,7 @@ class PoseRecord(Record):
             return super().course(matcher)
         names = (str(step.block) for step in self.parse.steps)
         errors = (step.error for step in self.pose.steps)
-        blocks = next((score.tp + score.fn for score in self.scores), self.pose.reached)
-        return Course(tuple(zip(names, errors, strict=True)), blocks - self.pose.reached)
+        return Course(tuple(zip(names, errors, strict=True)), self.n_blocks - self.pose.reached)
 
     def built(self, task: AssemblyTask) -> tuple[Block, ...]:
         """Return the blocks that were not refused, where they came to rest."""
@@ -253,7 +251,7 @@ def _executed(scene: Scene, blocks: Sequence[Block | None]) -> dict[str, Any]:
         "steps": steps,
         "limits": _LIMITS,
         "reached": reached,
-        "iou": round(voxel_iou(goal, done.blocks), _DIGITS),
+        "iou": round(voxel_iou(goal, done.blocks), 4),
         "completed": reached == len(goal) == len(done.blocks),
         "engine": described_engine(),
     }
