@@ -73,7 +73,7 @@ def loaded(parquet, folder, split):
 
 def test_a_tsv_file_is_as_vlmevalkit_reads_it(question_set, towers, tmp_path):
     out, asked_of = tmp_path / "out", str(question_set.root)
-    (file,) = files.write_vlmevalkit(out, asked_of, str(towers.root), None, 128)
+    (file,) = files.write_vlmevalkit(out, asked_of, str(towers.root), None)
     csv.field_size_limit(10**8)
     rows = csv_rows(file, delimiter="\t")
     asked = {task.key: task.question for task in question_set.tasks}
@@ -94,7 +94,7 @@ def test_a_tsv_file_is_as_vlmevalkit_reads_it(question_set, towers, tmp_path):
         for data in coded:
             assert len(data) > 64
             with PillowImage.open(io.BytesIO(base64.b64decode(data))) as picture:
-                assert picture.size == (128, 128)
+                assert picture.size == (512, 512)
         for letter, option in zip(LETTERS, question.options, strict=True):
             if is_picture_option(option):
                 place = int(row[letter].removeprefix("Picture ")) - 1
@@ -105,16 +105,16 @@ def test_a_tsv_file_is_as_vlmevalkit_reads_it(question_set, towers, tmp_path):
 
 def test_a_hugging_face_dataset_has_questions_scenes_and_pictures(question_set, towers, tmp_path):
     out, asked_of = tmp_path / "questions", str(question_set.root)
-    parquet, _ = files.write_questions(out, asked_of, str(towers.root), None, 128)
+    parquet, _ = files.write_questions(out, asked_of, str(towers.root), None)
     rows = loaded(parquet, tmp_path, "test")
     assert rows["id"][:] == [task.key for task in question_set.tasks]
     for row, task in zip(rows, question_set.tasks, strict=True):
         assert row["answer"] == task.question.answer_letters
         assert row["options"] == list(task.question.options)
-        assert [image.size for image in row["images"]] == [(128, 128)] * len(row["labels"])
-    parquet, card = files.write_scenes(tmp_path / "scenes", str(towers.root), None, 128)
+        assert [image.size for image in row["images"]] == [(512, 512)] * len(row["labels"])
+    parquet, card = files.write_scenes(tmp_path / "scenes", str(towers.root), None)
     rows = loaded(parquet, tmp_path, "test")
     assert "configs:" in card.read_text("utf-8")
     assert [json.loads(one)["id"] for one in rows["scene"]] == rows["id"][:]
     assert len(rows) == len((towers.root / "scenes.jsonl").read_text("utf-8").splitlines())
-    assert {rows[0][name].size for name in ("goal", "candidates")} == {(128, 128)}
+    assert {rows[0][name].size for name in ("goal", "candidates")} == {(512, 512)}
