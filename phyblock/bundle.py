@@ -140,9 +140,8 @@ def opened_bundle(path: Path, data: Sequence[Path] = ()) -> Iterator[Verified]:
 
 def _differs(where: object, field: str, made_by: str) -> StoreError:
     message = "does not verify: rescored records differ"
-    return StoreError(
-        Problem(str(where), message, field, hint=f"{_HINT}; it was made by phyblock {made_by}")
-    )
+    hint = f"{_HINT}; it was made by phyblock {made_by}"
+    return StoreError(Problem(str(where), message, field, hint=hint))
 
 
 def _localized(folder: Path, manifest: Manifest, data: Sequence[Path]) -> Manifest:

@@ -59,9 +59,7 @@ _SHOWN_EVERY_S = 0.1  # Minimum time between two updates of the display [s].
 @ui.models_file_option
 @click.option("--no-cache", is_flag=True, help="Neither read nor write the reply cache.")
 @click.option("--dry-run", is_flag=True, help="Print calls, tokens and dollars; call nothing.")
-@click.option(
-    "--retry-failed", is_flag=True, help="Ask again for samples whose request was rejected."
-)
+@click.option("--retry-failed", is_flag=True, help="Ask again for rejected samples.")
 @click.option("--no-report", is_flag=True, help="Write only tables, no page.")
 @ui.yes_option
 def run(

@@ -194,9 +194,8 @@ class Scene:
     def graph(self) -> AOVGraph:
         """The scene's AOV graph; vertex v is `blocks[v]`."""
         vertex_of = {block.order: vertex for vertex, block in enumerate(self.blocks)}
-        return AOVGraph(
-            tuple(frozenset(vertex_of[order] for order in block.depend) for block in self.blocks)
-        )
+        depends_on = (frozenset(vertex_of[order] for order in b.depend) for b in self.blocks)
+        return AOVGraph(tuple(depends_on))
 
 
 MAX_CANDIDATES = 16

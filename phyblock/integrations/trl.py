@@ -53,8 +53,7 @@ def reward(tasks: Tasks) -> Callable[..., list[float]]:
         return "".join(one.get("text") or "" for one in content)
 
     def phyblock(completions: Sequence[Any], key: Sequence[str], **_: Any) -> list[float]:
-        return [
-            tasks[name].score(text(one)).value for one, name in zip(completions, key, strict=True)
-        ]
+        pairs = zip(completions, key, strict=True)
+        return [tasks[name].score(text(one)).value for one, name in pairs]
 
     return phyblock

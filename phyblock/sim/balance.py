@@ -29,7 +29,7 @@ from phyblock.domain.scene import Block
 from phyblock.errors import PhyblockError
 from phyblock.sim import certificate, contact
 from phyblock.sim.certificate import Body, Contact, Falls, Stands, Structure
-from phyblock.sim.contact import Turned
+from phyblock.sim.contact import CONTACT_TOLERANCE_M, Turned
 from phyblock.sim.geometry import centers_m, cross
 
 Floats = NDArray[np.float64]
@@ -111,9 +111,8 @@ def prove(blocks: Sequence[Block]) -> Proven | None:
         return standing
     wide = _contacts(blocks, -MARGIN_M)
     solution = _least_imbalance(blocks, _matrix(wide, len(blocks), _MUCH))
-    motion = _exact(
-        -solution.eqlin.marginals.reshape(-1, 3) * np.tile([[1.0], [10.0]], (len(blocks), 1))
-    )
+    scales = np.tile([[1.0], [10.0]], (len(blocks), 1))
+    motion = _exact(-solution.eqlin.marginals.reshape(-1, 3) * scales)
     proof = Falls(tuple(zip(motion[::2], motion[1::2], strict=True)))
     structure = Structure(_bodies(blocks), (), (), _stated(wide))
     return Proven(structure, proof) if certificate.proves(proof, structure) else None
@@ -259,9 +258,7 @@ def _contacts(blocks: Sequence[Block], margin_m: float = 0.0) -> _Contacts:
         for corners in _on_floor(b)
     ]
     for (below, one), (above, other) in combinations(enumerate(blocks), 2):
-        if contact.boxes_near(
-            contact.bounds_m(one), contact.bounds_m(other), contact.CONTACT_TOLERANCE_M
-        ):
+        if contact.boxes_near(contact.bounds_m(one), contact.bounds_m(other), CONTACT_TOLERANCE_M):
             found += [
                 (below, above, corners + one.position_m, normal)
                 for corners, normal in _between(*contact.beside(one, other), margin_m)
@@ -321,9 +318,9 @@ def _stated(met: _Contacts) -> tuple[Contact, ...]:
 def _on_floor(block: Block) -> tuple[Floats, ...]:
     """Corners of a block's contact with the ground; empty if there is none."""
     points = np.vstack([piece.vertices_m for piece in contact.pieces_of(block)])
-    if points[:, 2].min() >= contact.CONTACT_TOLERANCE_M:
+    if points[:, 2].min() >= CONTACT_TOLERANCE_M:
         return ()
-    foot = points[points[:, 2] < points[:, 2].min() + contact.CONTACT_TOLERANCE_M]
+    foot = points[points[:, 2] < points[:, 2].min() + CONTACT_TOLERANCE_M]
     # The outermost points in sixteen directions.
     angles = np.arange(16) * math.pi / 8 + 0.01
     reach = foot[:, :2] @ np.stack([np.cos(angles), np.sin(angles)])
@@ -338,8 +335,8 @@ def _between(
     met, is_wide = [], margin_m < 0
     for first, second, axes in contact.piece_pairs(contact.at(one), contact.at(other, way_m)):
         # A balance must not press on a block across a gap; a fall allows for all that may touch.
-        most_m = contact.CONTACT_TOLERANCE_M if is_wide else contact.FIT_TOLERANCE_M
-        if not -2 * contact.CONTACT_TOLERANCE_M <= axes.gap_m <= most_m:
+        most_m = CONTACT_TOLERANCE_M if is_wide else contact.FIT_TOLERANCE_M
+        if not -2 * CONTACT_TOLERANCE_M <= axes.gap_m <= most_m:
             continue
         near_m = _NEARLY_SAME_M if is_wide else _SAME_GAP_M
         best = axes.directions[axes.gaps_m > axes.gap_m - near_m]

@@ -98,9 +98,8 @@ def check(
 
 def check_steps(blocks: Sequence[Block], trial: Trial = DEFAULT_TRIAL) -> tuple[Stability, ...]:
     """Return the stability after each step: only the group of the block just placed is tried."""
-    near = [
-        next(g for g in groups(blocks[:n]) if blocks[n - 1] in g) for n in range(1, len(blocks) + 1)
-    ]
+    steps = (blocks[:n] for n in range(1, len(blocks) + 1))
+    near = [next(group for group in groups(step) if step[-1] in group) for step in steps]
     return tuple(_try_groups([] if is_proven(group) else [group], trial, QUIET_S) for group in near)
 
 

@@ -167,9 +167,7 @@ def corners_m(
     block_type: BlockType, position_m: tuple[float, float, float], euler_deg: Euler
 ) -> NDArray[np.float64]:
     """World corners of a block's solid at a pose, shape (n, 3) [m]."""
-    corners: NDArray[np.float64] = (
-        solid_mesh(block_type).vertices_m @ euler_deg_to_matrix(euler_deg).T
-    )
+    corners: Vectors = solid_mesh(block_type).vertices_m @ euler_deg_to_matrix(euler_deg).T
     corners += np.array(position_m)
     return corners
 

@@ -543,9 +543,7 @@ class _Pen:
         size = min(max(size_cm * per_cm, 0.024 * self._size_px), 0.05 * self._size_px)
         font = ImageFont.load_default(size=round(size, 2))
         rim = (0, 0, 0) if sum(ink) > _LIGHT_SUM else (255, 255, 255)
-        self._draw.text(
-            self.pixel(place), text, ink, font, anchor="mm", stroke_width=2, stroke_fill=rim
-        )
+        self._draw.text(self.pixel(place), text, ink, font, "mm", stroke_width=2, stroke_fill=rim)
 
 
 def _write(pen: _Pen, field: _Field, ink: Rgb, *, has_pole: bool) -> None:

@@ -139,9 +139,8 @@ def pack_samples(
     Each sample has its newest record, with the prompt if `sent` is given. Up to `failures` samples
     show how models fail. Raises OSError if the disk fails, StoreError for unreadable records.
     """
-    packs = {
-        kind: Pack(folder, kind, build) for kind in ("records", "scenes", "questions", "prompts")
-    }
+    kinds = ("records", "scenes", "questions", "prompts")
+    packs = {kind: Pack(folder, kind, build) for kind in kinds}
     # Distinct values, numbered from 0 in the order in which they come.
     tracks, scenes, numbered, outcomes, ways, errors = (
         defaultdict[Any, int](itertools.count().__next__) for _ in range(6)

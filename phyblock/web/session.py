@@ -365,9 +365,8 @@ class Ending:
             return None
         first = self.shown["tracks"][0]
         said = " · ".join(f"{one} {rounded(value)}" for one, value in first["line"])
-        about = (
-            f"{first['title']}: {first['measure']}, {counted(len(first['rows']), first['item'])}"
-        )
+        items = counted(len(first["rows"]), first["item"])
+        about = f"{first['title']}: {first['measure']}, {items}"
         pair = self._pair(next(iter(self._built))) if self._built else None
         return card_png("Can you build this?", f"{said}\n{about}", pair)
 
