@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from codecs import BOM_UTF8
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -105,7 +106,7 @@ def _read_file(folder: Path, request: Request) -> Reply | None:
     if not path.is_file():
         return None
     try:
-        data = read_bytes(path)
+        data = read_bytes(path).removeprefix(BOM_UTF8)
     except (OSError, ValueError) as error:
         raise DataError(Problem(str(path), f"cannot be read: {reason_of(error)}")) from error
     return read_raw_reply(decode(TypeAdapter(Any), data, str(path)), str(path))
