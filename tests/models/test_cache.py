@@ -7,6 +7,7 @@ import re
 import sqlite3
 import subprocess
 import sys
+from codecs import BOM_UTF8
 from dataclasses import replace
 from pathlib import Path
 
@@ -222,6 +223,8 @@ def test_a_broken_recording_is_an_error_at_its_place(tmp_path, content, said):
     (tmp_path / "007.json").write_bytes(content)
     with pytest.raises(DataError, match=said):
         answer(tmp_path, "007")
+    (tmp_path / "008.json").write_bytes(BOM_UTF8 + b'{"text": "whole"}')
+    assert answer(tmp_path, "008").text == "whole"
 
 
 def record(model, scene, seed, **fields):
