@@ -13,7 +13,7 @@ from phyblock.errors import Problem
 from phyblock.making.scenes.sketch import POSES
 from phyblock.sim import dynamics
 from phyblock.sim.contact import FIT_TOLERANCE_M, GROUND, find_gaps, find_overlaps, support_graph
-from phyblock.sim.dynamics import Stability, Trial, check
+from phyblock.sim.dynamics import DEFAULT_TRIAL, Stability, Trial, check
 from phyblock.sim.pictures import LEAST_SHOWN, PictureStyle, hidden_blocks, visible_shares
 
 
@@ -56,7 +56,7 @@ class SceneFacts:
     scene: Scene
     candidates: CandidateSet | None = None
     fit_m: float = FIT_TOLERANCE_M
-    trial: Trial = dynamics.DEFAULT_TRIAL
+    trial: Trial = DEFAULT_TRIAL
     quiet_s: float | None = None
 
     @cached_property
@@ -91,8 +91,7 @@ def _layer(facts: SceneFacts) -> Iterator[Finding]:
     for i, (block, layer) in enumerate(both):
         if block.layer != layer:
             message = (
-                f"block {block.order} is on layer {block.layer}, but on {layer} by the longest "
-                "path of dependencies"
+                f"block {block.order} is on layer {block.layer}, but on {layer} by dependencies"
             )
             yield _fault(message, block.order, field=f"blocks[{i}].layer")
 
@@ -239,9 +238,7 @@ def verify_scene(task: AssemblyTask) -> tuple[Finding, ...]:
     return tuple(findings_of(SceneFacts(task.scene, task.candidates), CHECKS))
 
 
-def verify_foreign(
-    task: AssemblyTask, trial: Trial = dynamics.DEFAULT_TRIAL
-) -> tuple[Finding, ...]:
+def verify_foreign(task: AssemblyTask, trial: Trial = DEFAULT_TRIAL) -> tuple[Finding, ...]:
     """Return findings on a task of the official data, whose positions are rounded millimeters."""
     # 2 mm cannot be seen in a picture.
     facts = SceneFacts(task.scene, task.candidates, fit_m=0.002, trial=trial, quiet_s=0.5)

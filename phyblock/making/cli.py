@@ -139,11 +139,7 @@ def _conclude(
     help=f"The kit's {len(PALETTES['kit'])} pairs of type and color, or all pairs.",
 )
 @click.option(
-    "--exclude",
-    multiple=True,
-    type=NAME_OR_PATH,
-    metavar="SET",
-    help="Also exclude the scenes of this set, in any colors.",
+    "--exclude", multiple=True, type=NAME_OR_PATH, metavar="SET", help="Exclude its scenes, too."
 )
 @_seed
 @console.worker_options()
@@ -250,9 +246,8 @@ def compare(first: str, second: str) -> None:
         headings = ("scene of A", "scene of B", "")
         console.print_rows(console.make_console(), headings, rows, numbers=0)
     same = sum(how == "equal" for *_, how in rows)
-    click.echo(
-        f"of {counted(len(tasks), 'scene')}: {same} equal, {len(rows) - same} equal but for colors"
-    )
+    near = len(rows) - same
+    click.echo(f"of {counted(len(tasks), 'scene')}: {same} equal, {near} equal but for colors")
 
 
 @scenes.command("complete")
@@ -508,12 +503,10 @@ def verify_questions(path: str, data: str, jobs: int) -> None:
     found = [(q, problem) for q, problem in problems if problem]
     counts, failed = (Counter(q.subtask for q in some) for some in (asked, [q for q, _ in found]))
     summed, changed = files.check_sums(read.root)
-    rows: list[tuple[tuple[str, ...], int, int]] = [
-        ((s, SUBTASK_NAMES[s]), failed[s], counts[s]) for s in SUBTASKS if counts[s]
-    ]
-    rows.append((("", "checksums"), len(changed), summed))
+    rows = [((s, SUBTASK_NAMES[s]), failed[s], counts[s]) for s in SUBTASKS if counts[s]]
+    sums = (("", "checksums"), len(changed), summed)
     failures = sorted(f"{question.id}: {problem}" for question, problem in found)
-    _conclude(path, ("subtask", "", "derived again"), rows, (*failures, *changed))
+    _conclude(path, ("subtask", "", "derived again"), (*rows, sums), (*failures, *changed))
 
 
 @questions.command("show")

@@ -98,13 +98,9 @@ def resting_on(blocks: Sequence[Block], order: int, *, only: bool = False) -> Lo
 
     With `only`, they rest on nothing else. By naive rules, exactly these fall when it is removed.
     """
-    found: Lot = frozenset({order})
+    found, below = frozenset({order}), _below(tuple(blocks)).items()
     for _ in blocks:
-        found |= {
-            one
-            for one, under in _below(tuple(blocks)).items()
-            if under & found and (not only or under <= found)
-        }
+        found |= {one for one, under in below if under & found and (not only or under <= found)}
     return found - {order}
 
 
@@ -198,10 +194,8 @@ def falling(whole: Sequence[Block], order: int) -> Lot | None:
 def balances_on_edges(blocks: Sequence[Block], order: int, moved: Lot) -> bool:
     """True if a block that rested on the removed one stays on edges alone: nobody can tell."""
     still = [block for block in blocks if block.order not in moved | {order}]
-    flat = support_graph(still, only_areas=True)
-    return any(
-        order in below and not flat.get(one, True) for one, below in _below(tuple(blocks)).items()
-    )
+    flat, below = support_graph(still, only_areas=True), _below(tuple(blocks))
+    return any(order in under and not flat.get(one, True) for one, under in below.items())
 
 
 def _joined(lots: Sequence[Lot], most: int, enough: int | None = None) -> set[Lot]:

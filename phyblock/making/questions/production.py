@@ -193,9 +193,8 @@ def select(pool: Sequence[Draft], count: int, rng: np.random.Generator) -> list[
     every = [pool[i] for group in ranked for _, i in group]
     rank = rng.random(len(every)) / np.maximum(keeping_odds(every), 1e-9)
     most = max(int((rank <= 1).sum()), round(_SPARE * count))
-    left, rest = (
-        [every[i] for i in some] for some in np.split(rank.argsort(kind="stable"), [most])
-    )
+    order = rank.argsort(kind="stable")
+    left, rest = ([every[i] for i in some] for some in np.split(order, [most]))
     members: dict[Hashable, set[Hashable]] = defaultdict(set)
     for one in every:
         for group, member, _ in _even(one):

@@ -30,14 +30,12 @@ POSES: Mapping[BlockType, Mapping[str, Euler]] = {
 
 def transformed(blocks: Sequence[Block], symmetry: Symmetry) -> tuple[Block, ...]:
     """Return the blocks turned or mirrored about the origin; their graph does not change."""
-    return tuple(
-        replace(
-            block,
-            position_m=scene.image_m(block.position_m, symmetry),
-            euler_deg=_turned(block.type, block.euler_deg, symmetry),
-        )
-        for block in blocks
-    )
+    images = []
+    for block in blocks:
+        place_m = scene.image_m(block.position_m, symmetry)
+        euler_deg = _turned(block.type, block.euler_deg, symmetry)
+        images.append(replace(block, position_m=place_m, euler_deg=euler_deg))
+    return tuple(images)
 
 
 def colorless(blocks: Iterable[Block]) -> bytes:
