@@ -184,13 +184,15 @@ def dump_yaml(data: object) -> str:
     return text
 
 
-def read_yaml(path: Path, *, may_hold_keys: bool = False) -> YamlSource:
+def read_yaml(
+    path: Path, most_bytes: int = LARGEST_YAML_BYTES, *, may_hold_keys: bool = False
+) -> YamlSource:
     """Read a file as `parse_yaml` does. Raises SpecError if it cannot be read or is not YAML."""
     try:
-        text = read_text(path, LARGEST_YAML_BYTES)
+        text = read_text(path, most_bytes)
     except (OSError, ValueError) as error:
         raise SpecError(Problem(str(path), f"cannot be read: {reason_of(error)}")) from error
-    return parse_yaml(text, str(path), may_hold_keys=may_hold_keys)
+    return parse_yaml(text, str(path), most_bytes, may_hold_keys=may_hold_keys)
 
 
 def parse_yaml(

@@ -19,6 +19,9 @@ from phyblock.making.scenes.sketch import scene_of
 from phyblock.records.record import Line, validated
 
 
+_LARGEST_BYTES = 16 * 1024 * 1024  # Thousands of scenes.
+
+
 class GivenBlock(Line, extra="forbid"):
     """A block at its goal pose; `order`, `layer` and `depend` may be given, but are derived."""
 
@@ -106,7 +109,7 @@ def read_given(file: Path) -> list[tuple[GivenScene, str]]:
 
     It holds a scene, a list, or a mapping with `scenes`; one without `id` is named after the file.
     """
-    source = read_yaml(file, may_hold_keys=True)
+    source = read_yaml(file, _LARGEST_BYTES, may_hold_keys=True)
     data: Any = source.data
     at: FieldPath = ()
     if isinstance(data, dict) and "scenes" in data:
