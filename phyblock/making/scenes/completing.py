@@ -18,7 +18,6 @@ from phyblock.making.checks import LEVEL_LIMITS, SceneFacts, findings_of
 from phyblock.making.scenes.sketch import scene_of
 from phyblock.records.record import Line, validated
 
-
 _LARGEST_BYTES = 16 * 1024 * 1024  # Thousands of scenes.
 
 
