@@ -35,7 +35,7 @@ from tests.servers.openai_chat import OpenAIChat
 from tests.workspace import KEY
 
 OPENAI = ("direct", "openai", "vllm")
-ONCE = RetryPolicy(1, 0.0)
+ONCE = RetryPolicy(attempts=1, retry_for_s=0.0, base_s=0.0, max_retry_after_s=0.0)
 LOCAL = {"api_base": "http://localhost:8000/v1"}
 SNAPSHOT = {"id": "openai/gpt-4o-2024-08-06"}
 GATEWAYS = [replace(ROUTES["vllm"], model_id=f"{name}/m") for name in ("xai", "openrouter")]
