@@ -6,7 +6,8 @@ Guarantees:
   limits far above what a legitimate file needs. They raise OSError for failures of the disk, and
   ValueError for refused contents, with a text that can be shown to users.
 * A kill at any moment leaves the old file or the new one, whole (`atomic_write`).
-* Files of the user in a folder are never overwritten or removed (`OutFolder`).
+* In a folder that may hold files of the user, only files that phyblock wrote are overwritten or
+  removed, and links are never followed (`OutFolder`).
 """
 
 from __future__ import annotations

@@ -27,7 +27,8 @@ Physics = Literal["off", "settle", "strict"]
 
 StepEnd = Literal["stands", "falls", "knocks_over", "overlaps", "under_floor", "no_block"]
 """Ending of a step. `stands`: all blocks stay where they were. `falls`: the block does not.
-`knocks_over`: others do not. `overlaps`, `under_floor`: it was refused. `no_block`: no such one."""
+`knocks_over`: others do not. `overlaps`, `under_floor`: it was refused. `no_block`: no candidate
+has this number."""
 STEP_ENDS: tuple[StepEnd, ...] = get_args(StepEnd)
 REFUSED_ENDS: tuple[StepEnd, ...] = ("overlaps", "under_floor", "no_block")
 """Endings of steps whose block is not there afterwards."""

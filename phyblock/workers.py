@@ -62,7 +62,8 @@ def _begin(plugins: list[str]) -> None:
 class Workers:
     """Runs pure functions over tasks in batches of `size`: here, in processes, or on a cluster.
 
-    `submit` starts a job, `ahead` batches before the first is needed; `shards` share them in files.
+    `submit` starts a job; `ahead` batches are started before the answers of the first are needed.
+    With `shards`, batches are kept in files and shared with other programs.
     """
 
     submit: Callable[..., Future[Any]]

@@ -185,8 +185,9 @@ class ModelConfig(Section):
     reasoning_effort: _Effort | None = None
     """Effort of a reasoning model; null: not sent."""
     image_detail: ImageDetail | None = None
-    """Detail of pictures: OpenAI's `detail` (auto, low, high, original), Gemini's media resolution
-    (low, medium, high, ultra_high); null: the provider's default. It may refuse other values."""
+    """Detail of pictures: `detail` of OpenAI and compatible servers (auto, low, high, original),
+    Gemini's media resolution (low, medium, high, ultra_high); null: the provider's default. A
+    provider refuses or ignores other values."""
     extra_body: Annotated[dict[str, JsonValue], checked(_body_faults)] = Field(default_factory=dict)
     """Further fields of the request body, sent unchanged; not model, messages, n, best_of, stream,
     max_tokens, max_completion_tokens."""

@@ -98,7 +98,8 @@ class ImagesSpec(Section):
     """The pictures that a model is shown."""
 
     source: Literal["render", "dataset"] = "render"
-    """render: drawn from the scene. dataset: the official composites, whole or cut into halves."""
+    """render: drawn from the scene. dataset: the official composites, whole or cut into halves; a
+    scene without one is an error."""
     layout: Literal["composite", "separate"] = "composite"
     """composite: goal and candidates in one picture. separate: two pictures."""
     order: _Order = ("goal", "candidates")
@@ -126,7 +127,8 @@ class ScoringSpec(Section):
     """optimal: interchangeable blocks are matched so that as many steps as possible count. paper:
     greedy, the paper's Algorithm 1. The first in the list gives the headline numbers."""
     level1: types.Criterion = "selection"
-    """selection: one-to-one, any order. membership: the paper's. aov: as at the other levels."""
+    """Criterion of Level 1. selection: one-to-one, any order. membership: that of the paper's
+    Level-1 columns. aov: as at the other levels."""
     missing: Literal["count", "skip"] = "count"
     """count: a missing reply placed no block. skip: its scene is excluded, as in the paper."""
 

@@ -40,7 +40,8 @@ class CycleError(ValueError):
 class AOVGraph:
     """Dependencies of n blocks (paper section 3.2).
 
-    `depends_on[v]` is placed before v. Raises ValueError for a vertex outside 0..n-1, CycleError.
+    `depends_on[v]` is placed before v. Raises ValueError for a vertex outside 0..n-1, CycleError if
+    no order exists.
     """
 
     depends_on: tuple[frozenset[int], ...]

@@ -144,7 +144,7 @@ class _BlockPlay:
 
 
 class _PosePlay:
-    """Assembly with poses, after `begin`; blocks of its kind within `_NEAR` reach a goal block."""
+    """Assembly with poses, after `begin`; a goal block is reached by its kind within `_NEAR`."""
 
     def __init__(self, style: PictureStyle, *, is_strict: bool) -> None:
         self._style, self._is_strict = style, is_strict

@@ -21,6 +21,7 @@ from phyblock.data.scenes import StoredScene
 from phyblock.domain.question import LETTERS, is_picture_option
 from phyblock.errors import Problem, SpecError
 from phyblock.files import OutFolder
+from phyblock.results.text import CsvRows
 from phyblock.sim.pictures import PictureStyle, candidates_png, goal_png, goal_style
 
 
@@ -116,8 +117,9 @@ def write_vlmevalkit(
 
     asked_of = question_tasks(questions, data, limit)
     rows = [row(task) for task in asked_of if len(task.item.question.answer) == 1]
-    table = pd.DataFrame(rows).to_csv(sep="\t", index=False)
-    return OutFolder(folder).write({"PhyBlock_MCQ.tsv": table})
+    table = CsvRows()
+    pd.DataFrame(rows).to_csv(table, sep="\t", index=False, lineterminator="\r\n")
+    return OutFolder(folder).write({"PhyBlock_MCQ.tsv": table.getvalue()})
 
 
 def write_lmms_eval(folder: Path, limit: int | None) -> tuple[Path, ...]:

@@ -139,7 +139,7 @@ def _conclude(
     help=f"The kit's {len(PALETTES['kit'])} pairs of type and color, or all pairs.",
 )
 @click.option(
-    "--exclude", multiple=True, type=NAME_OR_PATH, metavar="SET", help="Exclude its scenes, too."
+    "--exclude", multiple=True, type=NAME_OR_PATH, metavar="SET", help="Also exclude its scenes."
 )
 @_seed
 @console.worker_options()
@@ -233,8 +233,9 @@ def compare(first: str, second: str) -> None:
 
     Scenes are equal also if turned, mirrored or shifted; the list says where only colors differ.
     """
-    tasks, known = read_data_set(first).tasks, read_data_set(second).tasks
+    tasks, known = read_data_set(first).tasks, read_data_set(second).tasks[::-1]
     rows = []
+    # The first twin of each form in B counts.
     equal = {fingerprint(task.scene.blocks): task.key for task in known}
     nearly = {colorless(task.scene.blocks): task.key for task in known}
     for task in tasks:
@@ -292,7 +293,9 @@ def complete_set(file: Path, jobs: int, out: Path | None) -> None:
 def verify_scenes(data: str, jobs: int) -> None:
     """Check every number of every scene of PATH by geometry and physics.
 
-    PATH is a folder with scenes.jsonl, an official checkout or a bundled set [phyblock-400].
+    PATH is a folder with scenes.jsonl, an official checkout or a bundled set, by default
+    phyblock-400.
+
     Checks contacts, layers, overlaps, gaps, stability of the whole at two time steps and of every
     step, candidates and duplicates. Overlaps and gaps of an official checkout may be 2 mm; other
     sets are also checked for sizes, hidden blocks, parents and checksums. Exits with 1 on failure.

@@ -112,7 +112,7 @@ def map_entries() -> dict[str, dict[str, Any]]:
 
 
 def map_entry(config: ModelConfig) -> dict[str, Any]:
-    """Return a model's entry in litellm's map, by id or the provider's bare name; maybe empty."""
+    """Return a model's entry in litellm's map, by id or the provider's bare name, or {}."""
     entries = map_entries()
     if config.id in entries:
         return entries[config.id]

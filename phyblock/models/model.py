@@ -161,9 +161,8 @@ class Servers:
 
         It is chosen when the request is admitted, so that a server that is down gets only one.
         """
-        all_usable = self.usable()
         server = min(
-            all_usable, key=lambda s: (self._rests_s(s), s is failed, s.under_way, s.chosen)
+            self.usable(), key=lambda s: (self._rests_s(s), s is failed, s.under_way, s.chosen)
         )
         is_trial = server.failures > 1 and not server.is_tried
         server.is_tried |= is_trial

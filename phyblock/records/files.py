@@ -29,7 +29,7 @@ from phyblock.registry import known_tracks
 FORMAT = 1
 """Version of run folders; additional fields do not change it."""
 MANIFEST = "run.yaml"
-_HINT = "restore the file from a copy; a run with a plugin needs it again: phyblock --plugin MODULE"
+_HINT = "restore the file from a copy; if the run used a plugin: phyblock --plugin MODULE"
 _DIGITS = 16
 _LARGEST_BYTES = 2 * 1024 * 1024
 """Far above the manifest of the largest allowed suite."""

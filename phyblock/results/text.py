@@ -153,18 +153,19 @@ def to_csv(frame: pd.DataFrame, float_format: str | None = None) -> str:
         if not pd.api.types.is_numeric_dtype(kind):
             cells = [csv_cell(value) for value in safe[name]]
             safe[name] = pd.Series(cells, index=safe.index, dtype=object)
-    rows = _Rows()
+    rows = CsvRows()
     safe.to_csv(rows, index=False, float_format=float_format, lineterminator="\r\n")
     return rows.getvalue()
 
 
-class _Rows(io.StringIO):
+class CsvRows(io.StringIO):
     """Rows of CSV, each of which arrives with CR LF and is kept with LF.
 
     Before Python 3.13, only CR LF as the end of rows puts cells with a carriage return in quotes.
     """
 
     def write(self, row: str) -> int:
+        """Append a row."""
         return super().write(row.removesuffix("\r\n") + "\n")
 
 

@@ -113,6 +113,7 @@ class AppendFile:
         """Close the file, once everything that was put is written."""
         if self._file is not None:
             self._file.close()
+            self._file = None
 
 
 Answer = Reply | ModelError | None

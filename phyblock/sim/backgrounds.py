@@ -133,7 +133,7 @@ def _to_floor(camera: Camera, size_px: int) -> tuple[NDArray[np.float32], NDArra
 class Ground:
     """A background: the share of light that a shadow removes, 0..1, and colors.
 
-    `ink` colors text, `line` the candidates' grid, `rim` outlines; `paint` or `texture`: the floor.
+    `ink` colors text, `line` the candidates' grid, `rim` outlines, `paint` or `texture` the floor.
     """
 
     shadow: float

@@ -258,7 +258,8 @@ def contact_corners_m(
 
     `direction` (3,) is the contact's normal, from the first to the second; no corners if they meet
     in less than a line. Half of a margin [m] is removed along the rims of either piece: the rest
-    touches even if the pieces are off by it. A negative one is added: the part that may touch.
+    touches even if the pieces are off by it. A negative one is added, which gives
+    the part that may touch.
     """
     lower, upper, shared, basis = _patches(first, second, direction)
     if margin_m < 0:

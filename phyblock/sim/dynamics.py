@@ -341,7 +341,8 @@ class Executor:
         if block is None:
             return ExecutedStep("no_block")
         block = replace(block, order=self._steps)
-        overlap_cm, stand_cm, stand_deg = EXECUTION_LIMITS.values()
+        names = ("overlap_cm", "stand_cm", "stand_deg")
+        overlap_cm, stand_cm, stand_deg = (EXECUTION_LIMITS[name] for name in names)
         if (below_cm := -float(bounds_m(block)[0, 2]) * _CM) > overlap_cm:
             return ExecutedStep("under_floor", overlap_cm=round(below_cm, _DIGITS))
         others = self.blocks

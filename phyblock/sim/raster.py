@@ -161,7 +161,8 @@ class Light:
 class Raster:
     """A drawing: `rgb` shape (size, size, 3), 0..255, row 0 on top; the others (size, size).
 
-    `prop` is the prop in each pixel, or -1, `face` its face; `shaded`: the ground is in shadow.
+    `prop` is the prop in each pixel, or -1, `face` its face; `shaded` is true for
+    ground in shadow.
     """
 
     rgb: NDArray[np.uint8]

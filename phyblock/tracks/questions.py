@@ -55,7 +55,8 @@ class VqaSpec(PictureControls):
     """builtin: a folder with questions.jsonl. official: a folder with question files in the
     official JSON form and their pictures."""
     path: Annotated[str, Field(min_length=1)] = "phyblock-vqa"
-    """A bundled set (phyblock-vqa) or a folder, as in dataset.path; about the scenes of dataset."""
+    """Name of a bundled question set (phyblock-vqa), or a folder, relative as in dataset.path. Its
+    scenes are those of dataset."""
     subtasks: UniqueSome[SubtaskName] = (*SUBTASKS,)
     """Subtasks to ask about."""
     circular: Flag = False

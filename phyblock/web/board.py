@@ -86,7 +86,7 @@ class TrackValues:
 
 @dataclass(frozen=True, eq=False)
 class SiteRun:
-    """A run given as `where`; `unverified` is what was not checked of a bundle, None: a folder."""
+    """A run given as `where`; `unverified` is what a bundle left unchecked, None for a folder."""
 
     where: str
     run: Run

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -108,6 +109,9 @@ def read_given(file: Path) -> list[tuple[GivenScene, str]]:
 
     It holds a scene, a list, or a mapping with `scenes`; one without `id` is named after the file.
     """
+    if file.suffix not in (".yaml", ".yml", ".json"):
+        allowed = "a file of scenes: .yaml, .yml or .json"
+        raise DataError(Problem(str(file), "is not such a file", allowed=allowed))
     source = read_yaml(file, _LARGEST_BYTES, may_hold_keys=True)
     data: Any = source.data
     at: FieldPath = ()
@@ -119,6 +123,9 @@ def read_given(file: Path) -> list[tuple[GivenScene, str]]:
         here = (*at, number) if is_list else at
         name = f"{file.stem}-{number + 1}" if is_list else file.stem
         named = {"id": name, **raw} if isinstance(raw, dict) else raw
+        if named is not raw and "id" not in raw and not re.fullmatch(stored.NAME, name):
+            where, message = source.where(here), "has no id, and cannot be named after its file"
+            raise DataError(Problem(where, message, "id", name, stored.NAME_ALLOWED))
         given, where = validated(GivenScene, named, source, here), source.where(here)
         if given.id in scenes:
             message = f"is used by {scenes[given.id][1]} already"
