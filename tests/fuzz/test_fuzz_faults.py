@@ -65,7 +65,7 @@ def prepare(workspace, url, track, transport, seeds):
     if transport == "direct":  # by two addresses, so that what fails at one is asked at the other
         fields["api_base"] = [f"{one}/v1" for one in (url, url.replace("127.0.0.1", "localhost"))]
     workspace.write_models(url, "alpha", **fields)
-    limits = {"max_concurrency": 24, "timeout_s": 10.0}
+    limits = {"max_concurrency": 24, "timeout_s": 5.0}
     workspace.write_suite(models=["alpha"], seeds=seeds, limits=limits, **TRACKS[track][1])
 
 
