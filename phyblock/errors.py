@@ -58,7 +58,7 @@ class PhyblockError(Exception):
 
 
 class InputError(PhyblockError):
-    """What the user gave is wrong (exit code 2); `problems` holds all that was found."""
+    """Wrong input of the user (exit code 2); `problems` holds all that was found."""
 
     def __init__(self, problems: Problem | Iterable[Problem]) -> None:
         self.problems = (problems,) if isinstance(problems, Problem) else tuple(problems)

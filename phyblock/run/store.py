@@ -117,7 +117,7 @@ class AppendFile:
 
 
 Answer = Reply | ModelError | None
-"""What came back for a request; None is a reply that is missing in a recording."""
+"""The outcome of a request; None is a reply that is missing in a recording."""
 
 
 def begun(
