@@ -1,8 +1,8 @@
 """A run as one file that others can score again: its manifest, its records and their digests.
 
 A bundle is a ZIP archive of three members, the same bytes for the same run. It holds no prompts,
-pictures or addresses of servers, the last part of local paths, and kind and status of failed
-requests. It may be hostile: members have known names and sizes, and no path in it is ever used.
+pictures or addresses of servers, of local paths only the last part, and of failed requests only
+kind and status. It may be hostile: members have known names and sizes, and no path in it is used.
 """
 
 from __future__ import annotations
